@@ -1,0 +1,25 @@
+# Libraries of Debian 12 (toolchain/install-dependencies), each behind one target with system include folders, so that
+# their headers raise no warnings of ours.
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(PNG REQUIRED)
+find_package(JPEG REQUIRED)
+find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc calib3d)
+find_package(Ceres 2.1 REQUIRED)
+find_package(embree 3 REQUIRED)
+find_package(octomap REQUIRED) # oracle of the tests and peer of the benchmarks; the program itself does not link it
+
+function(firstlook_system name)
+  cmake_parse_arguments(ARG "" "" "INCLUDES;LIBRARIES" ${ARGN})
+  add_library(${name} INTERFACE)
+  target_include_directories(${name} SYSTEM INTERFACE ${ARG_INCLUDES})
+  target_link_libraries(${name} INTERFACE ${ARG_LIBRARIES})
+endfunction()
+firstlook_system(firstlook_opencv INCLUDES ${OpenCV_INCLUDE_DIRS} LIBRARIES ${OpenCV_LIBS})
+firstlook_system(firstlook_ceres INCLUDES ${CERES_INCLUDE_DIRS} LIBRARIES ${CERES_LIBRARIES})
+firstlook_system(firstlook_octomap INCLUDES ${OCTOMAP_INCLUDE_DIRS} LIBRARIES ${OCTOMAP_LIBRARIES})
+firstlook_system(firstlook_embree INCLUDES ${EMBREE_INCLUDE_DIRS} LIBRARIES embree)
