@@ -54,6 +54,18 @@ struct LinkFrames {
 /// "ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"; empty for any other name.
 [[nodiscard]] std::optional<ArmModel> find_arm_model(std::string_view name);
 
+/// How much larger the radii of `ArmModel::body` are than those of `true_body`.
+inline constexpr double kBodyPadding_m = 0.010;
+
+/// The slimmer geometry that the simulated cell takes for the real arm: every capsule lies inside `arm.body` whatever
+/// the joints are (proved by sampling in tests/unit/kinematics). Grading uses it; planning never does.
+[[nodiscard]] Capsules true_body(const ArmModel& arm);
+
+/// Where a job starts and parks by default: the flange above the base, its z axis (where a camera looks) outwards and
+/// 14 degrees or more down, its y axis down, joint 1 at 0. Found by search: stands in the default safe zone with the
+/// 0.20 m envelope, with the most room to turn joint 1 by any angle.
+[[nodiscard]] JointVector default_start(const ArmModel& arm);
+
 /// Forward kinematics, about 0.2 us for six joints.
 [[nodiscard]] LinkFrames forward(const ArmModel& arm, const JointVector& q_rad);
 

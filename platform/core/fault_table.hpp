@@ -30,6 +30,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kCameraNotOnArm,         2006, kRefusal,  "camera not on the arm",                "No joint moves the image: mount the camera on the arm, or free a stuck joint.") \
   X(kCalibrationRejected,    2007, kRefusal,  "calibration rejected",                 "See the reasons in the report; check the mount, the board and its size.") \
   X(kBoardMoved,             2008, kRefusal,  "the board moved during the job",       "Fix the board and the cart, then start again.") \
+  X(kCameraOnInnerLink,      2009, kRefusal,  "the camera is not on the last link",   "Mount the camera on the flange: only that is calibrated so far.") \
   X(kMapTooLarge,            3001, kRefusal,  "the map does not fit its memory",      "Choose a coarser resolution or smaller extents.") \
   X(kFrameRefused,           3002, kNotice,   "depth frame refused",                  "Check the depth stream: size, scale and time stamps.") \
   X(kMapUnreadable,          3003, kRefusal,  "map file unreadable",                  "Use a .bt or .ot file that OctoMap can read.") \
@@ -44,6 +45,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kProtectiveStop,         5004, kStop,     "protective or emergency stop",         "Find the cause, clear it at the pendant, then press start again.") \
   X(kProgramStopped,         5005, kStop,     "stopped by the operator",              "Press start for a new job.") \
   X(kFrameGone,              5006, kNotice,   "a frame is no longer held by its device", "The computer is too slow for the stream.") \
+  X(kMoveRefused,            5007, kStop,     "the controller refused a move",        "Check the joint limits and speeds of the configuration against the controller's.") \
   X(kConfigUnreadable,       6001, kRefusal,  "configuration not readable",           "Correct the file; `firstlook config --defaults` shows every key.") \
   X(kConfigUnknownKey,       6002, kRefusal,  "unknown configuration key",            "Correct the key; `firstlook config --defaults` shows every key.") \
   X(kConfigBadValue,         6003, kRefusal,  "configuration value out of range",     "Correct the value; `firstlook config --defaults` shows the defaults.") \

@@ -1,0 +1,115 @@
+#include "algorithms/calibration/arm_sigma.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace firstlook {
+namespace {
+
+Vector6d prior_diagonal(const ArmSigma& sigma) {
+  Vector6d p;
+  p << Eigen::Vector3d::Constant(1 / (sigma.translation_m * sigma.translation_m)),
+      Eigen::Vector3d::Constant(1 / (sigma.rotation_rad * sigma.rotation_rad));
+  return p;
+}
+
+/// One view with its deviation eliminated (Schur complement).
+struct Eliminated {
+  Matrix6d arm_inverse;
+  Matrix12x6d gain;  ///< global_arm * arm_inverse
+  Vector6d right;
+};
+
+Eliminated eliminate(const ViewNormal& view, const Vector6d& deviation, const Vector6d& prior) {
+  Matrix6d arm = view.arm;
+  arm.diagonal() += prior;
+  Eliminated e;
+  e.arm_inverse = arm.llt().solve(Matrix6d::Identity());
+  e.gain = view.global_arm * e.arm_inverse;
+  e.right = view.arm_right - prior.cwiseProduct(deviation);
+  return e;
+}
+
+/// Inverse of a positive definite matrix whose rows have different units; empty when it is singular to rounding.
+std::optional<Matrix12d> inverse(const Matrix12d& m) {
+  const Vector12d diagonal = m.diagonal();
+  if (!m.allFinite() || !(diagonal.minCoeff() > 0)) return std::nullopt;
+  const Vector12d scale = diagonal.cwiseSqrt().cwiseInverse();
+  const Matrix12d scaled = scale.asDiagonal() * m * scale.asDiagonal();
+  const Eigen::LDLT<Matrix12d> ldlt(scaled);
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-14)) return std::nullopt;
+  const Matrix12d scaled_inverse = ldlt.solve(Matrix12d::Identity());
+  const Matrix12d result = scale.asDiagonal() * scaled_inverse * scale.asDiagonal();
+  return Matrix12d((result + result.transpose()) / 2);
+}
+
+}  // namespace
+
+std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
+                                           const ArmSigma& sigma) {
+  const Vector6d prior = prior_diagonal(sigma);
+  std::vector<Eliminated> eliminated;
+  Matrix12d schur = Matrix12d::Zero();
+  Vector12d right = Vector12d::Zero();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    eliminated.push_back(eliminate(views[i], deviations[i], prior));
+    const Eliminated& e = eliminated.back();
+    schur += views[i].global - e.gain * views[i].global_arm.transpose();
+    right += views[i].global_right - e.gain * e.right;
+  }
+  const auto covariance = inverse(schur);
+  if (!covariance) return std::nullopt;
+
+  LinearSolution solution;
+  solution.covariance = *covariance;
+  const Vector12d step = *covariance * right;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Eliminated& e = eliminated[i];
+    const Vector6d own = e.arm_inverse * (e.right - views[i].global_arm.transpose() * step);
+    solution.deviations.push_back(deviations[i] + own);
+    const Matrix6d spread = e.arm_inverse + e.gain.transpose() * *covariance * e.gain;
+    solution.deviation_covariance.push_back(spread);
+    const Matrix12x6d cross = -*covariance * e.gain;
+    solution.effective_parameters += (views[i].global * *covariance).trace() +
+                                     2 * (views[i].global_arm.transpose() * cross).trace() +
+                                     (views[i].arm * spread).trace();
+  }
+  return solution;
+}
+
+ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Matrix6d> covariances,
+                        const RefinementOptions& options) {
+  double translation2 = 0, rotation2 = 0;
+  for (std::size_t i = 0; i < deviations.size(); ++i) {
+    translation2 += deviations[i].head<3>().squaredNorm() + covariances[i].topLeftCorner<3, 3>().trace();
+    rotation2 += deviations[i].tail<3>().squaredNorm() + covariances[i].bottomRightCorner<3, 3>().trace();
+  }
+  const double axes = 3.0 * static_cast<double>(deviations.size());
+  ArmSigma next = options.arm_sigma;
+  if (next.translation_m <= 0) {
+    next.translation_m = std::max(options.arm_sigma_min.translation_m, std::sqrt(translation2 / axes));
+  }
+  if (next.rotation_rad <= 0) {
+    next.rotation_rad = std::max(options.arm_sigma_min.rotation_rad, std::sqrt(rotation2 / axes));
+  }
+  return next;
+}
+
+std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
+                                           ArmSigma start, const RefinementOptions& options) {
+  constexpr int kIterationsMax = 300;  // a step is about 50 us for 25 views; slow where the camera is weaker than the arm
+  constexpr double kChangeMin = 2e-5;
+  for (int i = 0; i < kIterationsMax; ++i) {
+    const auto solution = solve_linear(views, deviations, start);
+    if (!solution) return std::nullopt;
+    const ArmSigma next = next_arm_sigma(solution->deviations, solution->deviation_covariance, options);
+    const double change = std::max(std::abs(std::log(next.translation_m / start.translation_m)),
+                                   std::abs(std::log(next.rotation_rad / start.rotation_rad)));
+    start = next;
+    if (change < kChangeMin) break;
+  }
+  return start;
+}
+
+}  // namespace firstlook

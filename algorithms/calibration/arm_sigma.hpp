@@ -1,0 +1,37 @@
+/// How far the arm's word about its flange is from the truth, estimated together with everything else.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "algorithms/calibration/hand_eye_refinement.hpp"
+#include "algorithms/calibration/reprojection_terms.hpp"
+
+namespace firstlook {
+
+/// Solution of the linearised problem for given sigmas.
+struct LinearSolution {
+  Matrix12d covariance = Matrix12d::Zero();    ///< of (hand-eye, board), deviations marginalised
+  std::vector<Matrix6d> deviation_covariance;  ///< one for each view
+  std::vector<Vector6d> deviations;            ///< in total, not the step
+  double effective_parameters = 0;             ///< trace of the hat matrix over the corner residuals
+};
+
+/// Solves the normal equations of all views (weights: 1 / corner variance) with a Gaussian prior of `sigma` on the arm
+/// deviations, which stand at `deviations` where the views are linearised. Empty when they are singular.
+[[nodiscard]] std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views,
+                                                         std::span<const Vector6d> deviations, const ArmSigma& sigma);
+
+/// Expectation maximisation (Dempster, Laird and Rubin 1977) over the linearised problem: the expected squares of the
+/// deviations give the next sigmas. Sigmas that `options` states stay; none falls below its lower bound. Empty when the
+/// normal equations are singular.
+[[nodiscard]] std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views,
+                                                         std::span<const Vector6d> deviations, ArmSigma start,
+                                                         const RefinementOptions& options);
+
+/// The next sigmas from deviations and their covariances, by the rule above.
+[[nodiscard]] ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Matrix6d> covariances,
+                                      const RefinementOptions& options);
+
+}  // namespace firstlook

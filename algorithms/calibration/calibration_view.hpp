@@ -1,0 +1,35 @@
+/// What calibration is computed from.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "algorithms/vision/rotation.hpp"
+#include "platform/core/transform.hpp"
+
+namespace firstlook {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// One view of the board: where the arm said the flange was, and all corners of the board, row by row.
+struct CalibrationView {
+  Transform<Base, Flange> base_T_flange;
+  std::vector<Eigen::Vector2d> corners_px;
+};
+
+/// One view reduced to two poses.
+struct PosePair {
+  Transform<Base, Flange> base_T_flange;
+  Transform<Camera, Board> camera_T_board;
+};
+
+/// How far `estimate` lies from `truth`: (t_truth - t_estimate, Log(R_truth R_estimate^T)), metres and radians in the
+/// parent frame. Every covariance of a transform in this folder is that of this difference (left perturbation:
+/// R = Exp(d_r) R_est, t = t_est + d_t).
+[[nodiscard]] Vector6d pose_difference(const Pose& truth, const Pose& estimate);
+
+/// Inverse of pose_difference: the truth from an estimate and a difference.
+[[nodiscard]] Pose perturb(const Pose& estimate, const Vector6d& difference);
+
+}  // namespace firstlook

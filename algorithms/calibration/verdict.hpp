@@ -1,0 +1,101 @@
+/// The whole hand-eye calibration: solve, validate, judge.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "algorithms/calibration/calibration_view.hpp"
+#include "algorithms/calibration/hand_eye_closed_form.hpp"
+#include "algorithms/calibration/hand_eye_refinement.hpp"
+
+namespace firstlook {
+
+/// What a calibration must meet to be accepted.
+struct VerdictLimits {
+  int views_min = 6;
+  double sigma_translation_max_m = 0.001;  ///< largest of the three axes
+  double sigma_rotation_max_rad = 0.002;
+  double holdout_rms_max_px = 2.0;     ///< views left out of the solve, arm deviations included
+  double subset_spread_max_m = 0.003;  ///< RMS distance of 100 solves on 70 % of the views from the whole
+  double gated_views_max = 0.25;       ///< share of the views that may be wrong
+  double voxel_size_m = 0.05;          ///< mapping: 3 sigma at mapping_distance_m within half of it (DESIGN 7.5)
+  double mapping_distance_m = 1.5;
+  double tolerance_m = 0.01;  ///< of the gripper, for the usable distance (thesis eq. 7-2)
+  double usable_distance_min_m = 0.3;
+};
+
+struct HandEyeOptions {
+  Solver solver = Solver::kParkMartin;
+  RefinementOptions refinement;
+  VerdictLimits limits;
+  int subset_solves = 100;
+  double subset_share = 0.7;
+  std::uint64_t seed = 1;  ///< of the random subsets
+};
+
+enum class Verdict : std::uint8_t { kAccepted, kRejected };
+
+/// Everything that result.json's hand_eye object says, and what the report shows beside it.
+struct HandEyeResult {
+  Transform<Flange, Camera> flange_T_camera;
+  Transform<Base, Board> base_T_board;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of flange_T_camera: pose_difference, m and rad, flange axes
+  Matrix6d board_covariance = Matrix6d::Zero();
+  Eigen::Vector3d sigma_translation_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma_rotation_rad = Eigen::Vector3d::Zero();
+  double reprojection_rms_px = 0;  ///< 0 when solved from pose pairs
+  double holdout_rms_px = 0;       ///< 0 when solved from pose pairs
+  double holdout_rms_m = 0;        ///< board centre as predicted by the others against as seen, RMS distance
+  double subset_spread_m = 0;      ///< RMS over the solves of the distance of their translation from the whole's
+  double subset_spread_rad = 0;
+  double usable_distance_m = 0;
+  double corner_sigma_px = 0;
+  ArmSigma arm_sigma;
+  AxXbResidual ax_xb_all_pairs;
+  AxXbResidual ax_xb_consecutive;
+  bool from_pairs = false;
+  int views = 0;              ///< used in the solve
+  std::vector<ViewFit> fits;  ///< one for each view given
+  Verdict verdict = Verdict::kRejected;
+  std::vector<std::string> reasons;  ///< why rejected; empty when accepted
+};
+
+/// Closed form, refinement, hold-out, subsets, usable distance, verdict. Deterministic. About 1 s for 25 views of 54
+/// corners. A rejected calibration is a value, not an error.
+/// @return the errors of solve_closed_form and refine_hand_eye
+[[nodiscard]] Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+                                                       std::span<const CalibrationView> views,
+                                                       const HandEyeOptions& options = {});
+[[nodiscard]] Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pairs,
+                                                                  const HandEyeOptions& options = {});
+
+/// The two halves of calibrate_hand_eye for a job that solves first and validates later: the first leaves holdout,
+/// subsets, usable distance and verdict (kRejected) unset.
+[[nodiscard]] Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+                                                   std::span<const CalibrationView> views,
+                                                   const HandEyeOptions& options = {});
+void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+                       const HandEyeOptions& options, HandEyeResult& result);
+
+/// Reprojection RMS (px, each coordinate) of views that took no part in the solve, the arm's pose taken as said.
+[[nodiscard]] double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board,
+                                      std::span<const CalibrationView> views,
+                                      const Transform<Flange, Camera>& flange_T_camera,
+                                      const Transform<Base, Board>& base_T_board);
+
+/// Largest distance from the camera at which an error of 3 sigma in every axis stays within `tolerance_m`: thesis
+/// eq. 7-2, (tolerance - |x| - |y| - |z|) / sqrt(tan^2 P + tan^2 Y), rotation about the optical axis left out. 0 when
+/// the translation alone exceeds the tolerance; at most 100 m.
+[[nodiscard]] double usable_distance(const Transform<Flange, Camera>& flange_T_camera, const Matrix6d& covariance,
+                                     double tolerance_m);
+
+/// Eq. 7-2 itself for given errors: translation m, pitch and yaw rad.
+[[nodiscard]] double usable_distance_of_errors(const Eigen::Vector3d& translation_m, double pitch_rad, double yaw_rad,
+                                               double tolerance_m);
+
+/// Standard deviation (m) of where a point `distance_m` ahead of the camera is thought to be, the worst direction.
+[[nodiscard]] double point_sigma(const Transform<Flange, Camera>& flange_T_camera, const Matrix6d& covariance,
+                                 double distance_m);
+
+}  // namespace firstlook

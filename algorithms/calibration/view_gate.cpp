@@ -1,0 +1,137 @@
+#include "algorithms/calibration/view_gate.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "platform/core/random.hpp"
+
+namespace firstlook {
+namespace {
+
+// Below these a view is never called wrong: what arms and boards commonly deviate by.
+constexpr double kTranslationFloor_m = 0.5e-3;
+constexpr double kRotationFloor_rad = 1e-3;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Sizes of the misfits as one number each, in median (or floor) misfits.
+struct Misfits {
+  std::vector<double> ratio;
+  double median_translation_m = 0;
+  double median_rotation_rad = 0;
+  /// 0.5 m: a rotation of the flange moves the board in view by about that much for each radian.
+  [[nodiscard]] double size_m() const { return median_translation_m + 0.5 * median_rotation_rad; }
+};
+
+Misfits measure(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera) {
+  const auto misfits = flange_misfits(pairs, flange_T_camera, median_board_pose(pairs, flange_T_camera));
+  std::vector<double> translation, rotation;
+  for (const Vector6d& m : misfits) {
+    translation.push_back(m.head<3>().norm());
+    rotation.push_back(m.tail<3>().norm());
+  }
+  Misfits result;
+  result.median_translation_m = median(translation);
+  result.median_rotation_rad = median(rotation);
+  for (std::size_t i = 0; i < misfits.size(); ++i) {
+    result.ratio.push_back(std::max(translation[i] / std::max(kTranslationFloor_m, result.median_translation_m),
+                                    rotation[i] / std::max(kRotationFloor_rad, result.median_rotation_rad)));
+  }
+  return result;
+}
+
+std::vector<PosePair> kept(std::span<const PosePair> pairs, const std::vector<bool>& keep) {
+  std::vector<PosePair> result;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (keep[i]) result.push_back(pairs[i]);
+  }
+  return result;
+}
+
+std::array<PosePair, 4> random_four(std::span<const PosePair> pairs, Random& random) {
+  std::array<std::size_t, 4> chosen{};
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    do {
+      chosen[k] = static_cast<std::size_t>(random.below(static_cast<int>(pairs.size())));
+    } while (std::find(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(k), chosen[k]) !=
+             chosen.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  return {pairs[chosen[0]], pairs[chosen[1]], pairs[chosen[2]], pairs[chosen[3]]};
+}
+
+}  // namespace
+
+std::vector<Vector6d> flange_misfits(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera,
+                                     const Transform<Base, Board>& base_T_board) {
+  std::vector<Vector6d> misfits;
+  for (const PosePair& pair : pairs) {
+    const auto seen = base_T_board * (flange_T_camera * pair.camera_T_board).inverse();
+    misfits.push_back(pose_difference(seen.pose(), pair.base_T_flange.pose()));
+  }
+  return misfits;
+}
+
+Transform<Base, Board> median_board_pose(std::span<const PosePair> pairs,
+                                         const Transform<Flange, Camera>& flange_T_camera) {
+  std::vector<Pose> boards;
+  for (const PosePair& pair : pairs) {
+    boards.push_back((pair.base_T_flange * flange_T_camera * pair.camera_T_board).pose());
+  }
+  // The view whose board pose is nearest to the others' by median distance, then the mean of the nearer half.
+  std::size_t best = 0;
+  double best_distance = std::numeric_limits<double>::infinity();
+  const auto distance = [&](std::size_t i, std::size_t j) {
+    const Vector6d d = pose_difference(boards[i], boards[j]);
+    return d.head<3>().norm() + 0.5 * d.tail<3>().norm();
+  };
+  for (std::size_t i = 0; i < boards.size(); ++i) {
+    std::vector<double> distances;
+    for (std::size_t j = 0; j < boards.size(); ++j) distances.push_back(distance(i, j));
+    const double middle = median(distances);
+    if (middle < best_distance) {
+      best_distance = middle;
+      best = i;
+    }
+  }
+  std::vector<PosePair> near;
+  for (std::size_t j = 0; j < boards.size(); ++j) {
+    if (distance(best, j) <= 2 * best_distance) near.push_back(pairs[j]);
+  }
+  return mean_board_pose(near, flange_T_camera);
+}
+
+std::vector<bool> gate_views(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera,
+                             double gate) {
+  std::vector<bool> keep;
+  for (const double ratio : measure(pairs, flange_T_camera).ratio) keep.push_back(ratio <= gate);
+  return keep;
+}
+
+Result<Transform<Flange, Camera>> robust_closed_form(std::span<const PosePair> pairs, Solver solver, double gate) {
+  constexpr double kStandsOut = 3;  // in median misfits: common enough among good views to look closer, no more
+  constexpr int kTrials = 150;      // one of four wrong in each: a third of wrong views leaves 1 in 5 trials clean
+  auto plain = solve_closed_form(pairs, solver);
+  if (!plain || pairs.size() < 6) return plain;
+  const Misfits all = measure(pairs, *plain);
+  if (*std::max_element(all.ratio.begin(), all.ratio.end()) <= kStandsOut) return plain;
+
+  Random random(1, 2101);
+  auto best = *plain;
+  double best_size_m = all.size_m();
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const auto four = solve_closed_form(random_four(pairs, random), solver);
+    if (!four) continue;
+    const double size_m = measure(pairs, *four).size_m();
+    if (size_m < best_size_m) {
+      best_size_m = size_m;
+      best = *four;
+    }
+  }
+  return solve_closed_form(kept(pairs, gate_views(pairs, best, gate)), solver);
+}
+
+}  // namespace firstlook

@@ -1,0 +1,43 @@
+/// From a depth frame to the map: exactly OctoMap's insertPointCloud(points, origin, maxrange, discretize = false).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/mapping/depth_rays.hpp"
+#include "algorithms/mapping/voxel_map.hpp"
+
+namespace firstlook {
+
+struct InsertionResult : PixelCounts {
+  FrameChange change;
+};
+
+/// Holds the scratch memory for frames of one sensor into maps of one geometry; all of it is taken at construction.
+class Inserter {
+ public:
+  Inserter(const GridGeometry& geometry, const DepthSensor& sensor);
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const DepthSensor& sensor);
+
+  /// Updates `map` with one frame. Each pixel with a return gives a point; voxels that its ray passes are missed, the
+  /// end voxel is hit, occupied wins, one update for each voxel. Beyond min(range_max_m, range_trusted_m) the ray
+  /// clears up to that range and marks nothing. Rays are clipped to the grid.
+  /// @param self_depth_m  empty, or for each pixel the depth at which the arm's own body begins (render_self_depth)
+  /// @return kFrameRefused for a wrong size, scale, stamp or pose; the map is then unchanged.
+  [[nodiscard]] Result<InsertionResult> insert(VoxelMap& map, const DepthImage& depth,
+                                               const Transform<Base, Depth>& base_T_depth,
+                                               std::span<const float> self_depth_m, double stamp_s);
+
+  [[nodiscard]] const DepthSensor& sensor() const { return rays_.sensor(); }
+
+ private:
+  Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
+
+  GridGeometry geometry_;
+  DepthRays rays_;
+  std::vector<std::uint64_t> missed_;
+  std::vector<std::uint64_t> hit_;
+};
+
+}  // namespace firstlook

@@ -1,0 +1,188 @@
+#include "algorithms/mapping/octree_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <string>
+#include <vector>
+
+#include "platform/core/ensure.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr int kKeyZero = 32768;  // OctoMap's key of the voxel at the origin
+
+// The leaves at the depth where the tree is cut: a dense block of values with its place among the keys of that depth.
+struct Leaves {
+  Eigen::Vector3i first;  // key of the first leaf at this depth, 0 ..
+  Eigen::Vector3i size;
+  int depth = kOctreeDepth;
+  std::vector<std::int8_t> values;
+
+  [[nodiscard]] std::int8_t at(int x, int y, int z) const {
+    return values[(static_cast<std::size_t>(z) * static_cast<std::size_t>(size.y()) + static_cast<std::size_t>(y)) *
+                      static_cast<std::size_t>(size.x()) +
+                  static_cast<std::size_t>(x)];
+  }
+};
+
+// A cube of leaves: a node of the tree.
+struct Node {
+  Eigen::Vector3i low;  // key of its first leaf
+  int depth = 0;
+
+  [[nodiscard]] Node child(int i, int leaf_depth) const {
+    const int half = 1 << (leaf_depth - depth - 1);
+    return {low + half * Eigen::Vector3i(i & 1, (i >> 1) & 1, (i >> 2) & 1), depth + 1};
+  }
+};
+
+enum class Shape : std::uint8_t { kAbsent, kLeaf, kInner };
+
+// What OctoMap's tree would have here after pruning; `value` is the largest known below.
+struct NodeState {
+  Shape shape = Shape::kAbsent;
+  std::int8_t value = kUnknownLogOdds;
+};
+
+NodeState state_of(const Leaves& leaves, const Node& node) {
+  const int edge = 1 << (leaves.depth - node.depth);
+  const Eigen::Vector3i low = (node.low - leaves.first).cwiseMax(0);
+  const Eigen::Vector3i high = (node.low - leaves.first + Eigen::Vector3i::Constant(edge)).cwiseMin(leaves.size);
+  NodeState state;
+  if ((low.array() >= high.array()).any()) return state;
+  bool uniform = (high - low == Eigen::Vector3i::Constant(edge));
+  const std::int8_t first = leaves.at(low.x(), low.y(), low.z());
+  for (int z = low.z(); z < high.z(); ++z) {
+    for (int y = low.y(); y < high.y(); ++y) {
+      for (int x = low.x(); x < high.x(); ++x) {
+        const std::int8_t value = leaves.at(x, y, z);
+        uniform = uniform && value == first;
+        state.value = std::max(state.value, value);  // unknown is the smallest of all values
+      }
+    }
+  }
+  if (state.value == kUnknownLogOdds) return state;
+  // OctoMap never prunes the root.
+  state.shape = (uniform && node.depth > 0) || edge == 1 ? Shape::kLeaf : Shape::kInner;
+  return state;
+}
+
+std::array<NodeState, 8> children_of(const Leaves& leaves, const Node& node) {
+  std::array<NodeState, 8> children;
+  for (int i = 0; i < 8; ++i) children[static_cast<std::size_t>(i)] = state_of(leaves, node.child(i, leaves.depth));
+  return children;
+}
+
+// Cuts the map at a depth. With `classes_only` every known value becomes one of two, so that blocks of a class are
+// equal.
+Leaves cut(const VoxelMap& map, int depth, bool classes_only) {
+  const GridGeometry& g = map.geometry();
+  const int shift = kOctreeDepth - depth;
+  Leaves leaves;
+  leaves.depth = depth;
+  const Eigen::Vector3i first = g.first + Eigen::Vector3i::Constant(kKeyZero);
+  const Eigen::Vector3i last = first + g.size - Eigen::Vector3i::Ones();
+  for (int axis = 0; axis < 3; ++axis) {
+    ENSURE(3052, first[axis] >= 0 && last[axis] < 2 * kKeyZero);
+    leaves.first[axis] = first[axis] >> shift;
+    leaves.size[axis] = (last[axis] >> shift) - leaves.first[axis] + 1;
+  }
+  const auto nx = static_cast<std::size_t>(leaves.size.x()), ny = static_cast<std::size_t>(leaves.size.y());
+  leaves.values.assign(nx * ny * static_cast<std::size_t>(leaves.size.z()), kUnknownLogOdds);
+  std::size_t index = 0;
+  for (int z = 0; z < g.size.z(); ++z) {
+    for (int y = 0; y < g.size.y(); ++y) {
+      for (int x = 0; x < g.size.x(); ++x, ++index) {
+        std::int8_t value = map.log_odds(index);
+        if (value == kUnknownLogOdds) continue;
+        if (classes_only) value = value >= 0 ? 1 : 0;
+        const auto i = static_cast<std::size_t>(((first.x() + x) >> shift) - leaves.first.x());
+        const auto j = static_cast<std::size_t>(((first.y() + y) >> shift) - leaves.first.y());
+        const auto k = static_cast<std::size_t>(((first.z() + z) >> shift) - leaves.first.z());
+        std::int8_t& leaf = leaves.values[(k * ny + j) * nx + i];
+        leaf = std::max(leaf, value);
+      }
+    }
+  }
+  return leaves;
+}
+
+std::size_t count_nodes(const Leaves& leaves, const Node& node) {
+  std::size_t nodes = 1;
+  const std::array<NodeState, 8> children = children_of(leaves, node);
+  for (int i = 0; i < 8; ++i) {
+    const Shape shape = children[static_cast<std::size_t>(i)].shape;
+    if (shape == Shape::kInner) nodes += count_nodes(leaves, node.child(i, leaves.depth));
+    if (shape == Shape::kLeaf) ++nodes;
+  }
+  return nodes;
+}
+
+void write_header(std::string_view kind, const VoxelMap& map, std::size_t nodes, ByteSink sink) {
+  const std::string header = fmt::format(
+      "# Octomap OcTree {}file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
+      "id OcTree\nsize {}\nres {}\ndata\n",
+      kind, nodes, map.geometry().resolution_m);
+  sink(std::as_bytes(std::span(header)));
+}
+
+// Two bits a child, the lower bit first: free 1 0, occupied 0 1, has children 1 1, unknown 0 0.
+void write_binary_node(const Leaves& leaves, const Node& node, ByteSink sink) {
+  const std::array<NodeState, 8> children = children_of(leaves, node);
+  unsigned bits = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    const NodeState& child = children[i];
+    if (child.shape == Shape::kInner) bits |= 3u << (2 * i);
+    if (child.shape == Shape::kLeaf) bits |= (child.value > 0 ? 2u : 1u) << (2 * i);
+  }
+  const std::array<std::byte, 2> bytes = {static_cast<std::byte>(bits & 0xff), static_cast<std::byte>(bits >> 8)};
+  sink(bytes);
+  for (int i = 0; i < 8; ++i)
+    if (children[static_cast<std::size_t>(i)].shape == Shape::kInner)
+      write_binary_node(leaves, node.child(i, leaves.depth), sink);
+}
+
+// A little-endian float and one byte with a bit for each child, then the children.
+void write_full_node(const Leaves& leaves, const Node& node, const NodeState& state, ByteSink sink) {
+  std::array<NodeState, 8> children{};
+  if (state.shape == Shape::kInner) children = children_of(leaves, node);
+  unsigned present = 0;
+  for (unsigned i = 0; i < 8; ++i) present |= (children[i].shape != Shape::kAbsent ? 1u : 0u) << i;
+  const auto value = std::bit_cast<std::uint32_t>(static_cast<float>(state.value * kLogOddsUnit));
+  const std::array<std::byte, 5> bytes = {static_cast<std::byte>(value & 0xff),
+                                          static_cast<std::byte>((value >> 8) & 0xff),
+                                          static_cast<std::byte>((value >> 16) & 0xff),
+                                          static_cast<std::byte>(value >> 24), static_cast<std::byte>(present)};
+  sink(bytes);
+  for (int i = 0; i < 8; ++i) {
+    const NodeState& child = children[static_cast<std::size_t>(i)];
+    if (child.shape != Shape::kAbsent) write_full_node(leaves, node.child(i, leaves.depth), child, sink);
+  }
+}
+
+}  // namespace
+
+void write_bt(const VoxelMap& map, int depth, ByteSink sink) {
+  ENSURE(3051, depth >= 1 && depth <= kOctreeDepth);
+  const Leaves leaves = cut(map, depth, true);
+  const Node root{Eigen::Vector3i::Zero(), 0};
+  const bool empty = state_of(leaves, root).shape == Shape::kAbsent;
+  write_header("binary ", map, empty ? 0 : count_nodes(leaves, root), sink);
+  if (!empty) write_binary_node(leaves, root, sink);
+}
+
+void write_ot(const VoxelMap& map, int depth, ByteSink sink) {
+  ENSURE(3053, depth >= 1 && depth <= kOctreeDepth);
+  const Leaves leaves = cut(map, depth, false);
+  const Node root{Eigen::Vector3i::Zero(), 0};
+  const NodeState state = state_of(leaves, root);
+  const bool empty = state.shape == Shape::kAbsent;
+  write_header("", map, empty ? 0 : count_nodes(leaves, root), sink);
+  if (!empty) write_full_node(leaves, root, state, sink);
+}
+
+}  // namespace firstlook

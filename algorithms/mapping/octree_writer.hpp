@@ -1,0 +1,20 @@
+/// OctoMap's files streamed straight from the grid; no octree is built.
+#pragma once
+
+#include "algorithms/mapping/byte_sink.hpp"
+#include "algorithms/mapping/voxel_map.hpp"
+
+namespace firstlook {
+
+inline constexpr int kOctreeDepth = 16;  ///< OctoMap's: leaves at this depth are one voxel
+
+/// `.bt`: free and occupied only. Equal blocks are pruned as OctoMap prunes.
+/// @param depth  1..16: nodes are cut there, and a cut node is the largest value of its known voxels, as OctoMap's
+/// inner
+///               nodes are (a block of free and unknown voxels reads as free); ENSURE otherwise
+void write_bt(const VoxelMap& map, int depth, ByteSink sink);
+
+/// `.ot`: with log-odds in OctoMap's units; depth as above.
+void write_ot(const VoxelMap& map, int depth, ByteSink sink);
+
+}  // namespace firstlook

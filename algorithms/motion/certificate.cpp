@@ -1,0 +1,231 @@
+#include "algorithms/motion/certificate.hpp"
+
+#include <bitset>
+#include <limits>
+
+#include "platform/core/ensure.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// When to stop refining a margin.
+struct Wanted {
+  double enough = kInfinity;  ///< more than this need not be told apart
+  double stop = -kInfinity;   ///< less than this is a failure, however much less
+};
+
+/// Lower bound over a piece of a capsule's axis of the margin of its points, refined until it is enough or the piece is
+/// short. Along a segment the depth in the (convex) zone is smallest at an end; the field is read in the middle and can
+/// fall by half the length towards the ends. A bound of a whole piece holds for its halves too (`inherited`), so that
+/// whether the result is enough does not depend on what is asked for.
+double axis_margin(const FreeSpace& space, const Clearance& need, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                   double length_m, const Wanted& wanted, double inherited) {
+  double bound = std::max(inherited, std::min(space.zone_margin_m(a, need), space.zone_margin_m(b, need)));
+  if (bound >= wanted.enough || space.field == nullptr) return bound;
+  const Eigen::Vector3d middle = (a + b) / 2;
+  bound = std::max(bound, space.field_margin_m(middle, need) - length_m / 2);
+  if (bound >= wanted.enough || length_m <= kAxisSpacing_m) return bound;
+  const double first = axis_margin(space, need, a, middle, length_m / 2, wanted, bound);
+  if (first < wanted.stop) return first;
+  return std::min(first, axis_margin(space, need, middle, b, length_m / 2, wanted, bound));
+}
+
+/// The same for keep-outs.
+double keep_out_margin(const FreeSpace& space, const Clearance& need, const Eigen::Vector3d& a,
+                       const Eigen::Vector3d& b, double length_m, const Wanted& wanted, double inherited) {
+  const Eigen::Vector3d middle = (a + b) / 2;
+  const double bound = std::max(inherited, space.keep_out_margin_m(middle, need) - length_m / 2);
+  if (bound >= wanted.enough || length_m <= kAxisSpacing_m) return bound;
+  const double first = keep_out_margin(space, need, a, middle, length_m / 2, wanted, bound);
+  if (first < wanted.stop) return first;
+  return std::min(first, keep_out_margin(space, need, middle, b, length_m / 2, wanted, bound));
+}
+
+/// Margin of one placed capsule, as `wanted` for its surface.
+double capsule_margin(const FreeSpace& space, const Clearance& need, const Capsule& placed, const Wanted& wanted) {
+  const double r = placed.radius_m;
+  const double length_m = (placed.b - placed.a).norm();
+  const Wanted axis{.enough = wanted.enough + r, .stop = wanted.stop + r};
+  double margin = axis_margin(space, need, placed.a, placed.b, length_m, axis, -kInfinity) - r;
+  if (!space.keep_out_boxes.empty() || !space.keep_out_planes.empty()) {
+    margin = std::min(margin, keep_out_margin(space, need, placed.a, placed.b, length_m, axis, -kInfinity) - r);
+  }
+  return margin;
+}
+
+double pair_margin(const Capsules& placed, const SelfPair& pair) {
+  const Capsule& n = placed[static_cast<std::size_t>(pair.near)];
+  const Capsule& f = placed[static_cast<std::size_t>(pair.far)];
+  return segment_distance_m(n.a, n.b, f.a, f.b) - pair.axes_apart_m;
+}
+
+bool within_limits(const ArmModel& arm, const JointVector& q) {
+  if (q.size() != arm.joints || !q.all_finite()) return false;
+  for (int j = 0; j < arm.joints; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    if (q[j] < arm.lower_rad[i] || q[j] > arm.upper_rad[i]) return false;
+  }
+  return true;
+}
+
+/// A stretch of the segment with what is still to be proven on it.
+struct Interval {
+  double middle = 0;
+  double half = 0;
+  std::bitset<kCapsulesMax> capsules;
+  std::bitset<kSelfPairsMax> pairs;
+};
+
+class Proof {
+ public:
+  Proof(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
+        const JointVector& from, const JointVector& to)
+      : arm_(arm), body_(body), space_(space), need_(clearance), from_(from), to_(to), dq_(to - from) {
+    for (std::size_t i = 0; i < body.capsules.size(); ++i) {
+      bend_.push_back(second_derivative_bound(body.levers[i], body.capsules[i].link, dq_));
+      double sweep = 0;
+      for (int k = 0; k < arm.joints; ++k) sweep += std::abs(dq_[k]) * body.levers[i][static_cast<std::size_t>(k)];
+      sweep_.push_back(sweep);
+      if (body.exempt[i] == 0) all_.capsules.set(i);
+    }
+    for (std::size_t i = 0; i < body.self_pairs.size(); ++i) all_.pairs.set(i);
+    all_.middle = all_.half = 0.5;
+  }
+
+  Certificate run() {
+    result_.margin_m = kInfinity;
+    if (!end_is_free(from_, 0, Verdict::kStartBlocked) || !end_is_free(to_, 1, Verdict::kEndBlocked)) return result_;
+    FixedVector<Interval, 64> open;  // depth first: one waits on each level
+    open.push_back(all_);
+    while (!open.empty()) {
+      Interval here = open.back();
+      open.pop_back();
+      if (!prove(here)) return result_;
+      if (here.capsules.none() && here.pairs.none()) continue;
+      ENSURE(4121, open.size() + 2 <= open.capacity());
+      const double quarter = here.half / 2;
+      open.push_back({here.middle + quarter, quarter, here.capsules, here.pairs});
+      open.push_back({here.middle - quarter, quarter, here.capsules, here.pairs});
+    }
+    result_.verdict = Verdict::kCertified;
+    result_.fraction = 1;
+    return result_;
+  }
+
+ private:
+  bool fail(Verdict verdict, double fraction, int capsule, bool self, double margin) {
+    result_.verdict = verdict;
+    result_.fraction = fraction;
+    result_.capsule = capsule;
+    result_.self_collision = self;
+    result_.margin_m = margin;
+    return false;
+  }
+
+  bool end_is_free(const JointVector& q, double fraction, Verdict verdict) {
+    if (!within_limits(arm_, q)) return fail(verdict, fraction, -1, false, -kInfinity);
+    ++result_.evaluations;
+    const Capsules placed = place(body_.capsules, forward(arm_, q));
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      if (body_.exempt[i] != 0) continue;
+      const double margin = capsule_margin(space_, need_, placed[i], {kMarginMin_m, kMarginMin_m});
+      if (!(margin >= kMarginMin_m)) return fail(verdict, fraction, static_cast<int>(i), false, margin);
+    }
+    for (const SelfPair& pair : body_.self_pairs) {
+      const double margin = pair_margin(placed, pair);
+      if (!(margin >= kMarginMin_m)) return fail(verdict, fraction, pair.far, true, margin);
+    }
+    return true;
+  }
+
+  /// Strikes out what holds on the whole interval. False when something is too near in its middle.
+  bool prove(Interval& at) {
+    ++result_.evaluations;
+    const LinkFrames frames = forward(arm_, from_ + dq_ * at.middle);
+    const LinkTwists twists = link_twists(frames, dq_);
+    const Capsules placed = place(body_.capsules, frames);
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      if (!at.capsules.test(i)) continue;
+      const Capsule& c = placed[i];
+      const double speed =
+          std::sqrt(std::max(twists.velocity(c.link, c.a).squaredNorm(), twists.velocity(c.link, c.b).squaredNorm()));
+      const double moves = travel(speed, i, at.half);
+      const double margin = capsule_margin(space_, need_, c, {std::max(moves, kMarginMin_m), kMarginMin_m});
+      if (!(margin >= kMarginMin_m)) return fail(Verdict::kBlocked, at.middle, static_cast<int>(i), false, margin);
+      if (margin < moves) continue;
+      at.capsules.reset(i);
+      result_.margin_m = std::min(result_.margin_m, margin - moves);
+    }
+    for (std::size_t i = 0; i < body_.self_pairs.size(); ++i) {
+      if (!at.pairs.test(i)) continue;
+      const SelfPair& pair = body_.self_pairs[i];
+      const double margin = pair_margin(placed, pair);
+      if (!(margin >= kMarginMin_m)) return fail(Verdict::kBlocked, at.middle, pair.far, true, margin);
+      const double moves = relative_travel(twists, placed, pair, at.half, margin);
+      if (margin < moves) continue;
+      at.pairs.reset(i);
+      result_.margin_m = std::min(result_.margin_m, margin - moves);
+    }
+    return true;
+  }
+
+  /// No point of the capsule's axis moves farther than this from where it is in the middle (twist.hpp).
+  [[nodiscard]] double travel(double speed, std::size_t capsule, double half) const {
+    return std::min(half * speed + half * half / 2 * bend_[capsule], half * sweep_[capsule]);
+  }
+
+  /// The same for the farther capsule of a pair as seen from the nearer one's link: fewer joints move it, so its own
+  /// bounds hold.
+  [[nodiscard]] double relative_travel(const LinkTwists& twists, const Capsules& placed, const SelfPair& pair,
+                                       double half, double margin) const {
+    const auto far = static_cast<std::size_t>(pair.far);
+    if (margin >= half * sweep_[far]) return half * sweep_[far];
+    const Capsule& f = placed[far];
+    const int near_link = placed[static_cast<std::size_t>(pair.near)].link;
+    const auto speed = [&](const Eigen::Vector3d& p) {
+      return (twists.velocity(f.link, p) - twists.velocity(near_link, p)).squaredNorm();
+    };
+    return travel(std::sqrt(std::max(speed(f.a), speed(f.b))), far, half);
+  }
+
+  const ArmModel& arm_;
+  const Body& body_;
+  const FreeSpace& space_;
+  Clearance need_;
+  JointVector from_, to_, dq_;
+  FixedVector<double, kCapsulesMax> bend_;   ///< bound of |p''|
+  FixedVector<double, kCapsulesMax> sweep_;  ///< bound of |p'| in any configuration
+  Interval all_;
+  Certificate result_;
+};
+
+}  // namespace
+
+double configuration_margin(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
+                            const JointVector& q_rad) {
+  const Capsules placed = place(body.capsules, forward(arm, q_rad));
+  double margin = self_margin_m(placed, body.self_pairs);
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    if (body.exempt[i] == 0) margin = std::min(margin, capsule_margin(space, clearance, placed[i], {.enough = margin}));
+  }
+  return margin;
+}
+
+bool configuration_is_free(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
+                           const JointVector& q_rad, double margin_m) {
+  const Capsules placed = place(body.capsules, forward(arm, q_rad));
+  for (std::size_t i = placed.size(); i-- > 0;) {  // the outermost capsules fail most often
+    if (body.exempt[i] == 0 && !(capsule_margin(space, clearance, placed[i], {margin_m, margin_m}) >= margin_m))
+      return false;
+  }
+  return self_margin_m(placed, body.self_pairs) >= margin_m;
+}
+
+Certificate certify(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
+                    const JointVector& from, const JointVector& to) {
+  return Proof(arm, body, space, clearance, from, to).run();
+}
+
+}  // namespace firstlook

@@ -1,0 +1,127 @@
+#include "algorithms/motion/guardian.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "platform/core/ensure.hpp"
+
+namespace firstlook {
+namespace {
+
+/// Where on the segment the joints are nearest to q, each joint weighted by its lever arm.
+double nearest_fraction(const Body& body, const GuardianPath& path, const JointVector& q) {
+  const JointVector along = path.to - path.from;
+  const JointVector offset = q - path.from;
+  double dot = 0;
+  double length = 0;
+  for (int j = 0; j < q.size(); ++j) {
+    double weight = 0;
+    for (const LeverArms& levers : body.levers) weight = std::max(weight, levers[static_cast<std::size_t>(j)]);
+    dot += weight * weight * along[j] * offset[j];
+    length += weight * weight * along[j] * along[j];
+  }
+  return length > 0 ? std::clamp(dot / length, 0.0, 1.0) : 0;
+}
+
+/// No point of the body is displaced farther between the two configurations: what the ends of the axis move, and what
+/// the turn moves at the radius (a turn by t displaces by 2 sin(t/2) = |R - R'|_F / sqrt 2 for each metre).
+double displacement_m(const ArmModel& arm, const Body& body, const JointVector& a, const JointVector& b) {
+  const LinkFrames at_a = forward(arm, a);
+  const LinkFrames at_b = forward(arm, b);
+  double largest = 0;
+  for (const Capsule& c : body.capsules) {
+    const Pose& pa = at_a.base_T_link[static_cast<std::size_t>(c.link)];
+    const Pose& pb = at_b.base_T_link[static_cast<std::size_t>(c.link)];
+    const double turn = (pa.linear() - pb.linear()).norm() / std::numbers::sqrt2;
+    const double ends = std::max((pa * c.a - pb * c.a).norm(), (pa * c.b - pb * c.b).norm());
+    largest = std::max(largest, ends + turn * c.radius_m);
+  }
+  return largest;
+}
+
+/// Looks at points all over a capsule: its axis (nothing may be within the radius), and its surface.
+class CapsuleSampler {
+ public:
+  CapsuleSampler(const FreeSpace& space, const Clearance& need, const Capsule& placed, double spacing_m)
+      : space_(space), need_(need), c_(placed), spacing_m_(spacing_m) {
+    const Eigen::Vector3d d = c_.b - c_.a;
+    length_m_ = d.norm();
+    axis_ = length_m_ > 0 ? Eigen::Vector3d(d / length_m_) : Eigen::Vector3d::UnitZ();
+    across_ = axis_.unitOrthogonal();
+    side_ = axis_.cross(across_);
+  }
+
+  double margin() {
+    const int rings = 1 + static_cast<int>(std::ceil(length_m_ / spacing_m_));
+    for (int i = 0; i <= rings; ++i) {
+      const Eigen::Vector3d centre = c_.a + (c_.b - c_.a) * (static_cast<double>(i) / rings);
+      margin_ = std::min(margin_, space_.margin_m(centre, need_) - c_.radius_m);
+      ring(centre, c_.radius_m);
+    }
+    const int latitudes = 1 + static_cast<int>(std::ceil(c_.radius_m * std::numbers::pi / 2 / spacing_m_));
+    for (int i = 1; i <= latitudes; ++i) {
+      const double angle = std::numbers::pi / 2 * i / latitudes;
+      const Eigen::Vector3d along = axis_ * (c_.radius_m * std::sin(angle));
+      ring(c_.b + along, c_.radius_m * std::cos(angle));
+      ring(c_.a - along, c_.radius_m * std::cos(angle));
+    }
+    return margin_;
+  }
+
+ private:
+  void ring(const Eigen::Vector3d& centre, double radius_m) {
+    const int points = std::max(1, static_cast<int>(std::ceil(2 * std::numbers::pi * radius_m / spacing_m_)));
+    const double c = std::cos(2 * std::numbers::pi / points);
+    const double s = std::sin(2 * std::numbers::pi / points);
+    double x = radius_m;
+    double y = 0;
+    for (int i = 0; i < points; ++i) {
+      margin_ = std::min(margin_, space_.margin_m(centre + across_ * x + side_ * y, need_));
+      const double turned = c * x - s * y;
+      y = s * x + c * y;
+      x = turned;
+    }
+  }
+
+  const FreeSpace& space_;
+  const Clearance& need_;
+  const Capsule& c_;
+  double spacing_m_;
+  double length_m_ = 0;
+  Eigen::Vector3d axis_, across_, side_;
+  double margin_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+GuardianVerdict check(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
+                      const JointVector& q_rad, const std::optional<GuardianPath>& path, double deviation_max_m,
+                      double spacing_m) {
+  ENSURE(4141, spacing_m > 0 && q_rad.size() == arm.joints);
+  GuardianVerdict verdict;
+  if (path) {
+    verdict.path_fraction = nearest_fraction(body, *path, q_rad);
+    verdict.deviation_m = displacement_m(arm, body, q_rad, interpolate(path->from, path->to, verdict.path_fraction));
+  }
+  verdict.margin_m = std::numeric_limits<double>::infinity();
+  const Capsules placed = place(body.capsules, forward(arm, q_rad));
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    if (body.exempt[i] != 0) continue;
+    const double margin = CapsuleSampler(space, clearance, placed[i], spacing_m).margin();
+    if (margin < verdict.margin_m) verdict.margin_m = margin, verdict.capsule = static_cast<int>(i);
+  }
+  if (!(verdict.margin_m >= 0)) {
+    verdict.finding = GuardianFinding::kNotFree;
+  } else if (!(verdict.deviation_m <= deviation_max_m)) {
+    verdict.finding = GuardianFinding::kDeviation;
+  }
+  return verdict;
+}
+
+Clearance guardian_clearance(const Clearance& planned, double stopping_m) {
+  return {.voxels_m = planned.voxels_m - stopping_m, .surface_m = planned.surface_m - stopping_m};
+}
+
+}  // namespace firstlook

@@ -1,0 +1,197 @@
+#include "algorithms/view_planning/calibration_views.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "algorithms/kinematics/inverse_kinematics.hpp"
+#include "algorithms/kinematics/self_collision.hpp"
+#include "algorithms/view_planning/aim.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr std::uint64_t kStream = 4400;  // of random numbers; one for each choice
+constexpr std::size_t kFeasibleMax = 400;
+constexpr double kNearby_rad = 0.25;       // standard deviation of each joint around an earlier view
+constexpr double kTargetMargin_m = 0.005;  // states with less trap the arm (FACTS 3)
+constexpr double kDegree_rad = std::numbers::pi / 180;
+
+struct Candidate {
+  JointVector q;
+  double cost = 0;
+};
+
+/// Everything that one choice collects.
+struct Search {
+  const CalibrationViewInputs& inputs;
+  const JointVector& current;
+  const CalibrationViewOptions& options;
+  Random random;
+  FixedVector<Candidate, kFeasibleMax> feasible;
+  int considered = 0;
+};
+
+bool is_new(const Search& s, const JointVector& q) {
+  return std::all_of(s.inputs.taken.begin(), s.inputs.taken.end(), [&](const JointVector& other) {
+    return (q - other).max_abs() >= s.options.different_min_rad;
+  });
+}
+
+/// Keeps q when it is new, sees the whole board, is free and does not hide the board: from cheap to dear.
+void consider(Search& s, const JointVector& q) {
+  ++s.considered;
+  if (s.feasible.full() || !is_new(s, q)) return;
+  const CalibrationViewInputs& in = s.inputs;
+  const LinkFrames frames = forward(in.arm, q);
+  if (check_view(in.model, frames.flange(), s.options.limits) != ViewFault::kNone) return;
+  if (!configuration_is_free(in.arm, in.body, in.space, in.clearance, q, kTargetMargin_m)) return;
+  if (hides_board(in.model, place(in.body.capsules, frames), frames.flange())) return;
+  const double cost = predicted_cost(in.model, in.information, frames.flange(), s.options.cost_lever_m);
+  s.feasible.push_back({q, cost});
+}
+
+void draw_aimed(Search& s) {
+  const CalibrationViewInputs& in = s.inputs;
+  if (!has_closed_form_inverse(in.arm)) return;
+  const Transform<Camera, Flange> camera_T_flange = in.model.flange_T_camera.inverse();
+  const Eigen::Vector3d center = in.model.base_T_board * in.model.board.center();
+  const Eigen::Vector3d front = -in.model.base_T_board.rotation().col(2);  // the board's z points away from who sees it
+  for (int i = 0; i < s.options.aimed_draws; ++i) {
+    const Eigen::Vector3d direction = direction_within(front, s.options.tilt_max_rad, s.random);
+    const double distance_m = s.random.uniform(s.options.distance_min_m, s.options.distance_max_m);
+    const double roll_rad = s.random.uniform(0, 2 * std::numbers::pi);
+    const Eigen::Vector3d target = center + 0.03 * s.random.normal3();  // the board need not be in the middle
+    const auto base_T_camera = look_at<Camera>(target, direction, distance_m, roll_rad);
+    for (const JointVector& q : inverse(in.arm, base_T_camera * camera_T_flange, s.current)) consider(s, q);
+  }
+}
+
+void draw_random(Search& s) {
+  const ArmModel& arm = s.inputs.arm;
+  for (int i = 0; i < s.options.random_draws; ++i) {
+    JointVector q = JointVector::zero(arm.joints);
+    for (int j = 0; j < arm.joints; ++j) {
+      const auto at = static_cast<std::size_t>(j);
+      q[j] = s.random.uniform(std::max(arm.lower_rad[at], s.current[j] - std::numbers::pi),
+                              std::min(arm.upper_rad[at], s.current[j] + std::numbers::pi));
+    }
+    consider(s, q);
+  }
+}
+
+void draw_nearby(Search& s) {
+  const ArmModel& arm = s.inputs.arm;
+  for (int i = 0; i < s.options.nearby_draws; ++i) {
+    const int pick = s.random.below(static_cast<int>(s.inputs.taken.size()) + 1);
+    JointVector q = pick == 0 ? s.current : s.inputs.taken[static_cast<std::size_t>(pick) - 1];
+    for (int j = 0; j < arm.joints; ++j) {
+      const auto at = static_cast<std::size_t>(j);
+      q[j] = std::clamp(q[j] + kNearby_rad * s.random.normal(), arm.lower_rad[at], arm.upper_rad[at]);
+    }
+    consider(s, q);
+  }
+}
+
+PlannerOptions planning(const CalibrationViewOptions& options) {
+  PlannerOptions planner_options;
+  planner_options.seed = options.seed + options.step;
+  planner_options.iterations_max = options.plan_iterations_max;
+  planner_options.limits = options.speed;
+  return planner_options;
+}
+
+}  // namespace
+
+PredictedSigma predicted_sigma(const Matrix6d& covariance) {
+  return {.translation_m = std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
+          .rotation_rad = std::sqrt(covariance.bottomRightCorner<3, 3>().trace())};
+}
+
+bool hides_board(const ViewDesignModel& model, const Capsules& body_in_base,
+                 const Transform<Base, Flange>& base_T_flange) {
+  const Eigen::Vector3d eye = (base_T_flange * model.flange_T_camera).translation();
+  const int columns = model.board.inner_columns;
+  const int last = model.board.corners() - 1;
+  for (const int corner : {0, columns - 1, last - columns + 1, last}) {
+    const Eigen::Vector3d point = model.base_T_board * model.board.corner(corner);
+    for (const Capsule& c : body_in_base) {
+      if (segment_distance_m(eye, eye, c.a, c.b) <= c.radius_m) continue;
+      if (segment_distance_m(eye, point, c.a, c.b) <= c.radius_m) return true;
+    }
+  }
+  return false;
+}
+
+Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs& inputs, Planner& planner,
+                                                    const JointVector& current,
+                                                    const CalibrationViewOptions& options) {
+  const Status begun =
+      planner.begin(inputs.arm, inputs.body, inputs.space, inputs.clearance, current, planning(options));
+  if (!begun) return std::unexpected(begun.error());
+  Search s{.inputs = inputs,
+           .current = current,
+           .options = options,
+           .random = Random(options.seed, kStream + (std::uint64_t{options.step} << 20)),
+           .feasible = {},
+           .considered = 0};
+  draw_nearby(s);
+  draw_random(s);
+  draw_aimed(s);
+  std::stable_sort(s.feasible.begin(), s.feasible.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+
+  CalibrationViewChoice choice;
+  choice.considered = s.considered;
+  choice.feasible = static_cast<int>(s.feasible.size());
+  choice.before = predicted_covariance(inputs.information);
+  choice.after = choice.before;
+  const double cost_max = design_cost(choice.before, options.cost_lever_m) * (1 - options.cost_drop_min);
+  int plans = 0;
+  for (const Candidate& candidate : s.feasible) {
+    if (candidate.cost > cost_max) {
+      choice.outcome = CalibrationViewChoice::Outcome::kNoneHelps;
+      break;
+    }
+    if (++plans > options.plans_max) break;
+    const Result<Path> path = planner.plan_to(candidate.q);
+    if (!path) continue;
+    const Matrix12d added = view_information(inputs.model, forward(inputs.arm, candidate.q).flange());
+    choice.outcome = CalibrationViewChoice::Outcome::kChosen;
+    choice.target = candidate.q;
+    choice.path = *path;
+    choice.after = predicted_covariance(inputs.information + added);
+    break;
+  }
+  return choice;
+}
+
+Result<Turns> bootstrap_views(const ArmModel& arm, const Body& body, const FreeSpace& space,
+                              const Clearance& clearance, const JointVector& at) {
+  const double margin_m = configuration_margin(arm, body, space, clearance, at);
+  if (margin_m < kMarginMin_m) {
+    return failure(Fault::kStartBlocked, "the arm lacks {:.0f} mm of clearance", (kMarginMin_m - margin_m) * 1e3);
+  }
+  // Degrees of the last, last but one and last but two joint. The last rolls the image and hardly moves the board in it; the
+  // others pan and tilt, so they stay small. Consecutive turns differ in axis: that is what a hand-eye solution needs.
+  constexpr std::array<std::array<double, 3>, 10> kTurns{{{25, 0, 0},
+                                                          {0, 10, 0},
+                                                          {0, 0, 10},
+                                                          {-25, -10, 0},
+                                                          {20, 0, -10},
+                                                          {-20, 8, 8},
+                                                          {20, -8, -8},
+                                                          {12, 6, -6},
+                                                          {-12, -6, 6},
+                                                          {-12, 5, 0}}};
+  Turns views;
+  for (const auto& turn : kTurns) {
+    JointVector q = at;
+    for (int i = 0; i < 3 && i < arm.joints; ++i) q[arm.joints - 1 - i] += turn[static_cast<std::size_t>(i)] * kDegree_rad;
+    if (certify(arm, body, space, clearance, at, q).certified()) views.push_back(q);
+  }
+  return views;
+}
+
+}  // namespace firstlook

@@ -1,0 +1,272 @@
+#include "algorithms/view_planning/explore.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "algorithms/kinematics/inverse_kinematics.hpp"
+#include "algorithms/view_planning/aim.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each candidate of each step
+// Targets keep this beside the clearance: the next frame may take a little away from where the arm stands (FACTS 3:
+// states with less than 1 mm trap the arm).
+constexpr double kTargetMargin_m = 0.005;
+constexpr double kNearby_rad = 0.35;  // standard deviation of each joint around an earlier view
+constexpr double kStandOffMin_m = 0.6;
+constexpr double kStandOffMax_m = 1.5;
+constexpr double kAimCone_rad = 1.2;  // about the direction from unknown to free: 70 degrees, beyond it is grazing
+
+/// From an unknown voxel towards the free ones beside it; zero when they cancel out.
+Eigen::Vector3d outward(const VoxelMap& map, std::uint32_t voxel) {
+  const GridGeometry& geometry = map.geometry();
+  const Eigen::Vector3i v = geometry.voxel_at(voxel);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const Eigen::Vector3i d(dx, dy, dz);
+        const Eigen::Vector3i n = v + d;
+        if (geometry.contains(n) && map.voxel_class(geometry.index(n)) == VoxelClass::kFree) sum += d.cast<double>();
+      }
+    }
+  }
+  return sum;
+}
+
+double largest_joint_distance(const JointVector& a, const JointVector& b) { return (a - b).max_abs(); }
+
+}  // namespace
+
+ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor, int candidates_max, int workers_max,
+                         int certificate_samples_max, const GainSampling& sampling)
+    : gain_(geometry, sensor, sampling), candidates_max_(candidates_max) {
+  ENSURE(4531, candidates_max > 0 && workers_max > 0 && certificate_samples_max > 0);
+  for (int i = 0; i < workers_max; ++i) workers_.push_back(gain_.worker());
+  const auto room = static_cast<std::size_t>(std::max(candidates_max, 2 * certificate_samples_max));
+  candidates_.resize(room);
+  order_.reserve(room);
+  unreached_.reserve(room);
+}
+
+std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, int candidates_max, int workers_max,
+                                        int certificate_samples_max, const GainSampling& sampling) {
+  const auto rays = static_cast<std::size_t>(sampling.columns) * static_cast<std::size_t>(sampling.rows);
+  const auto room = static_cast<std::size_t>(std::max(candidates_max, 2 * certificate_samples_max));
+  const std::size_t worker = geometry.count() + rays * sizeof(Eigen::Vector3d);
+  return GainModel::required_bytes(geometry, sampling) + static_cast<std::size_t>(workers_max) * worker +
+         room * (sizeof(Candidate) + 2 * sizeof(int));
+}
+
+JointVector ViewChooser::draw_random(const Task& task, Random& random) const {
+  const ArmModel& arm = task.context.arm;
+  JointVector q = JointVector::zero(arm.joints);
+  for (int j = 0; j < arm.joints; ++j) {
+    // Half a turn to either side holds every posture once, and nothing winds up.
+    const auto i = static_cast<std::size_t>(j);
+    const double low = std::max(arm.lower_rad[i], task.current[j] - std::numbers::pi);
+    const double high = std::min(arm.upper_rad[i], task.current[j] + std::numbers::pi);
+    q[j] = random.uniform(low, high);
+  }
+  return q;
+}
+
+JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
+  const ArmModel& arm = task.context.arm;
+  const int pick = random.below(static_cast<int>(visited_.size()) + 1);
+  JointVector q = pick == 0 ? task.current : visited_[static_cast<std::size_t>(pick) - 1];
+  for (int j = 0; j < arm.joints; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    q[j] = std::clamp(q[j] + kNearby_rad * random.normal(), arm.lower_rad[i], arm.upper_rad[i]);
+  }
+  return q;
+}
+
+bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const {
+  const ViewContext& c = task.context;
+  const std::span<const std::uint32_t> frontier = gain_.frontier();
+  if (frontier.empty() || !has_closed_form_inverse(c.arm)) return false;
+  // The certificate goes through the frontier evenly; an ordinary choice picks at random.
+  const auto n = static_cast<int>(frontier.size());
+  const int pick =
+      task.certificate ? static_cast<int>(static_cast<std::int64_t>(index) * n / task.samples) : random.below(n);
+  const std::uint32_t voxel = frontier[static_cast<std::size_t>(pick)];
+  const Eigen::Vector3d out = outward(c.map, voxel);
+  const Eigen::Vector3d axis = out.norm() > 1e-9 ? Eigen::Vector3d(out.normalized()) : random.direction();
+  const Eigen::Vector3d direction = direction_within(axis, kAimCone_rad, random);
+  const double near_m = std::max(kStandOffMin_m, gain_.sensor().range_min_m + 0.05);
+  const double distance_m = random.uniform(near_m, std::max(near_m, kStandOffMax_m));
+  const Eigen::Vector3d target = c.map.geometry().center_m(c.map.geometry().voxel_at(voxel));
+  const auto base_T_depth = look_at<Depth>(target, direction, distance_m, random.uniform(0, 2 * std::numbers::pi));
+  if (c.space.margin_m(base_T_depth.translation(), c.clearance) < 0) return false;
+  double nearest_rad = 1e9;
+  for (const JointVector& q : inverse(c.arm, base_T_depth * task.depth_T_flange, task.current)) {
+    const double distance_rad = largest_joint_distance(q, task.current);
+    if (distance_rad >= nearest_rad) continue;
+    if (!configuration_is_free(c.arm, c.body, c.space, c.clearance, q, kTargetMargin_m)) continue;
+    nearest_rad = distance_rad;
+    q_rad = q;
+  }
+  return nearest_rad < 1e9;
+}
+
+void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) const {
+  const ViewContext& c = task.context;
+  const std::uint64_t block = (static_cast<std::uint64_t>(task.options.step) << 1) | (task.certificate ? 1U : 0U);
+  Random random(task.options.seed, kStream + (block << 20) + static_cast<std::uint64_t>(index));
+  // An ordinary choice takes turns; the certificate's first half is random, its second half aimed.
+  const int source = task.certificate ? (index < task.samples ? 0 : 2) : index % 3;
+  out = Candidate{};
+  while (!out.free && out.tries < task.options.tries_per_candidate) {
+    ++out.tries;
+    if (source == 2) {
+      out.free = draw_aimed(task, index - (task.certificate ? task.samples : 0), random, out.q);
+      continue;
+    }
+    out.q = source == 0 ? draw_random(task, random) : draw_nearby(task, random);
+    out.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, out.q, kTargetMargin_m);
+  }
+}
+
+bool ViewChooser::worthwhile(const Candidate& candidate, const ExploreOptions& options) const {
+  return candidate.free &&
+         (candidate.gain.unknown >= options.gain_min || candidate.gain.again >= options.again_min);
+}
+
+void ViewChooser::score(const Task& task, RunParallel run_parallel) {
+  const ViewTiming& timing = task.options.timing;
+  const auto score_one = [&](int index, int worker) {
+    Candidate& candidate = candidates_[static_cast<std::size_t>(index)];
+    find_candidate(task, index, candidate);
+    if (!candidate.free) return;
+    candidate.gain = gain_.count(task.context, candidate.q, workers_[static_cast<std::size_t>(worker)]);
+    if (!worthwhile(candidate, task.options)) return;
+    const double move_s =
+        time_segment(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits).duration_s;
+    candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
+  };
+  run_parallel(task.certificate ? 2 * task.samples : task.samples, score_one);
+}
+
+void ViewChooser::rank(const Task& task) {
+  order_.clear();
+  const int n = task.certificate ? 2 * task.samples : task.samples;
+  for (int i = 0; i < n; ++i) {
+    if (worthwhile(candidates_[static_cast<std::size_t>(i)], task.options)) order_.push_back(i);
+  }
+  std::sort(order_.begin(), order_.end(), [&](int a, int b) {
+    const double ua = candidates_[static_cast<std::size_t>(a)].utility_per_s;
+    const double ub = candidates_[static_cast<std::size_t>(b)].utility_per_s;
+    return ua > ub || (ua == ub && a < b);
+  });
+}
+
+bool ViewChooser::beside_unreached(const Task& task, const JointVector& q_rad) const {
+  const ViewContext& c = task.context;
+  return std::any_of(unreached_.begin(), unreached_.end(), [&](int i) {
+    const JointVector& other = candidates_[static_cast<std::size_t>(i)].q;
+    return certify(c.arm, c.body, c.space, c.clearance, other, q_rad).certified();
+  });
+}
+
+Status ViewChooser::plan_best(const Task& task, ViewChoice& choice) {
+  const ViewTiming& timing = task.options.timing;
+  PlannerOptions planning;
+  planning.seed = task.options.seed + task.options.step;
+  planning.iterations_max = task.options.plan_iterations_max;
+  planning.limits = timing.limits;
+  const ViewContext& c = task.context;
+  if (Status begun = planner_.begin(c.arm, c.body, c.space, c.clearance, task.current, planning); !begun) return begun;
+  const int plans_max = task.options.plans_max * (task.certificate ? 2 : 1);
+  int plans = 0;
+  unreached_.clear();
+  for (const int index : order_) {
+    const Candidate& candidate = candidates_[static_cast<std::size_t>(index)];
+    // Utilities of straight moves bound what paths can give: from here on nothing is better.
+    if (plans >= plans_max || candidate.utility_per_s <= choice.utility_per_s) break;
+    if (beside_unreached(task, candidate.q)) continue;
+    ++plans;
+    const Result<Path> path = planner_.plan_to(candidate.q);
+    if (!path) {
+      unreached_.push_back(index);
+      continue;
+    }
+    const double utility = candidate.gain.weight() / (path->duration_s + timing.settle_s + timing.look_s);
+    if (utility <= choice.utility_per_s) continue;
+    choice.outcome = ViewChoice::Outcome::kChosen;
+    choice.target = candidate.q;
+    choice.path = *path;
+    choice.gain = candidate.gain;
+    choice.utility_per_s = utility;
+  }
+  choice.planned += plans;
+  return {};
+}
+
+bool ViewChooser::can_move(const Task& task) const {
+  const ViewContext& c = task.context;
+  const auto last = candidates_.begin() + 2 * task.samples;
+  return std::any_of(candidates_.begin(), last, [&](const Candidate& candidate) {
+    return candidate.free &&
+           certify(c.arm, c.body, c.space, c.clearance, task.current, candidate.q).certified();
+  });
+}
+
+void ViewChooser::certify_end(const Task& task, ViewChoice& choice) const {
+  TerminationCertificate& certificate = choice.certificate;
+  certificate.gain_min = task.options.gain_min;
+  for (int i = 0; i < 2 * task.samples; ++i) {
+    const Candidate& candidate = candidates_[static_cast<std::size_t>(i)];
+    if (!candidate.free) continue;
+    ++(i < task.samples ? certificate.random_samples : certificate.aimed_samples);
+    if (worthwhile(candidate, task.options)) {
+      ++certificate.unreached;
+    } else {
+      certificate.gain_best = std::max(certificate.gain_best, candidate.gain.unknown);
+    }
+  }
+  certificate.clusters = static_cast<int>(find_remaining(task.context.map, task.context.zone, task.options.gain_min).size());
+  choice.outcome = can_move(task) ? ViewChoice::Outcome::kComplete : ViewChoice::Outcome::kNothingReachable;
+}
+
+Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVector& current,
+                                       const ExploreOptions& options, RunParallel run_parallel) {
+  ENSURE(4532, 2 * static_cast<std::size_t>(options.certificate_samples) <= candidates_.size());
+  gain_.prepare(context);
+  ViewChoice choice;
+  Task task{.context = context,
+            .current = current,
+            .options = options,
+            .depth_T_flange = context.flange_T_depth.inverse(),
+            .certificate = false,
+            .samples = candidates_max_};
+  for (const bool certificate : {false, true}) {
+    task.certificate = certificate;
+    task.samples = certificate ? options.certificate_samples : candidates_max_;
+    score(task, run_parallel);
+    const int n = certificate ? 2 * task.samples : task.samples;
+    for (int i = 0; i < n; ++i) {
+      choice.considered += candidates_[static_cast<std::size_t>(i)].tries;
+      choice.free += candidates_[static_cast<std::size_t>(i)].free ? 1 : 0;
+    }
+    rank(task);
+    choice.worthwhile += static_cast<int>(order_.size());
+    if (Status planned = plan_best(task, choice); !planned) return std::unexpected(planned.error());
+    if (choice.outcome == ViewChoice::Outcome::kChosen) return choice;
+  }
+  certify_end(task, choice);
+  return choice;
+}
+
+void ViewChooser::remember_look(const ViewContext& context, const JointVector& q_rad) {
+  gain_.remember_look(context, q_rad, workers_.front());
+  if (visited_.full()) {
+    std::rotate(visited_.begin(), visited_.begin() + 1, visited_.end());
+    visited_.pop_back();
+  }
+  visited_.push_back(q_rad);
+}
+
+}  // namespace firstlook

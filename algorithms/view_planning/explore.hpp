@@ -1,0 +1,118 @@
+/// The next best view: many configurations, filtered from cheap to dear, and a proof when none helps any more.
+#pragma once
+
+#include <vector>
+
+#include "algorithms/mapping/remaining.hpp"
+#include "algorithms/motion/planner.hpp"
+#include "algorithms/view_planning/gain.hpp"
+#include "algorithms/view_planning/parallel.hpp"
+
+namespace firstlook {
+
+struct ExploreOptions {
+  std::uint64_t seed = 1;
+  std::uint32_t step = 0;              ///< number of this choice: other candidates each time
+  int tries_per_candidate = 40;        ///< random configurations drawn for one that is free
+  std::uint32_t gain_min = 8;          ///< unknown voxels that make a view worth it (k of the certificate)
+  std::uint32_t again_min = 100;       ///< or voxels that it makes usable for motion
+  int plans_max = 24;                  ///< candidates that the planner may try; twice as many for the certificate
+  int plan_iterations_max = 400;       ///< for one of them
+  int certificate_samples = 2000;      ///< random configurations, and as many aimed at the frontier
+  ViewTiming timing;
+};
+
+/// Why exploration ends: every sampled view that can be reached sees fewer than `gain_min` unknown voxels.
+struct TerminationCertificate {
+  int random_samples = 0;     ///< free configurations drawn at random
+  int aimed_samples = 0;      ///< free configurations aimed at frontier voxels
+  std::uint32_t gain_min = 0;
+  std::uint32_t gain_best = 0;   ///< of all samples that can be reached
+  int unreached = 0;             ///< samples that would see enough, but no certified path was found that leads there
+  int clusters = 0;              ///< unknown clusters that touch free space
+};
+
+struct ViewChoice {
+  enum class Outcome : std::uint8_t {
+    kChosen,
+    kComplete,         ///< the certificate holds
+    kNothingReachable  ///< the arm cannot move: no free configuration was found that it can get to
+  };
+  Outcome outcome = Outcome::kNothingReachable;
+  JointVector target;
+  Path path;                 ///< certified, from the current configuration
+  ViewGain gain;             ///< expected
+  double utility_per_s = 0;  ///< gain weight for each second of move, settling and looking
+  int considered = 0;        ///< configurations looked at
+  int free = 0;              ///< of them inside known free space with margin
+  int worthwhile = 0;        ///< of them with enough gain
+  int planned = 0;           ///< handed to the planner
+  TerminationCertificate certificate;
+};
+
+/// Chooses views. All memory but the planner's answer is taken at construction.
+class ViewChooser {
+ public:
+  /// @param candidates_max  free configurations to score for one choice (150 are clearly better than 20: notes)
+  /// @param workers_max     the highest worker number that run_parallel will pass, plus 1
+  /// @param certificate_samples_max  upper limit of ExploreOptions::certificate_samples
+  ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor, int candidates_max = 320, int workers_max = 2,
+              int certificate_samples_max = 2000, const GainSampling& sampling = {});
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, int candidates_max = 320,
+                                                  int workers_max = 2, int certificate_samples_max = 2000,
+                                                  const GainSampling& sampling = {});
+
+  /// The view with the highest gain for each second that a certified path leads to; the same arguments give the same
+  /// choice with any number of workers. Errors: kStartBlocked when `current` is not free.
+  [[nodiscard]] Result<ViewChoice> choose(const ViewContext& context, const JointVector& current,
+                                          const ExploreOptions& options, RunParallel run_parallel);
+
+  /// Tells what a look brought: call it after each look (sweep too) was integrated into the map.
+  void remember_look(const ViewContext& context, const JointVector& q_rad);
+
+  [[nodiscard]] GainModel& gain() { return gain_; }
+  [[nodiscard]] const GainModel& gain() const { return gain_; }
+  [[nodiscard]] GainWorker& first_worker() { return workers_.front(); }
+  [[nodiscard]] Planner& planner() { return planner_; }
+
+ private:
+  struct Candidate {
+    JointVector q;
+    ViewGain gain;
+    double utility_per_s = 0;  ///< for the straight move, which no path is expected to beat
+    int tries = 0;
+    bool free = false;
+  };
+  /// One choice while it is made.
+  struct Task {
+    const ViewContext& context;
+    const JointVector& current;
+    const ExploreOptions& options;
+    Transform<Depth, Flange> depth_T_flange;
+    bool certificate = false;  ///< the large sample
+    int samples = 0;
+  };
+
+  [[nodiscard]] JointVector draw_random(const Task& task, Random& random) const;
+  [[nodiscard]] JointVector draw_nearby(const Task& task, Random& random) const;
+  [[nodiscard]] bool draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const;
+  void find_candidate(const Task& task, int index, Candidate& out) const;
+  void score(const Task& task, RunParallel run_parallel);
+  [[nodiscard]] bool worthwhile(const Candidate& candidate, const ExploreOptions& options) const;
+  void rank(const Task& task);
+  [[nodiscard]] Status plan_best(const Task& task, ViewChoice& choice);
+  [[nodiscard]] bool beside_unreached(const Task& task, const JointVector& q_rad) const;
+  [[nodiscard]] bool can_move(const Task& task) const;
+  void certify_end(const Task& task, ViewChoice& choice) const;
+
+  GainModel gain_;
+  std::vector<GainWorker> workers_;
+  std::vector<Candidate> candidates_;  ///< room for the certificate's samples
+  std::vector<int> order_;
+  std::vector<int> unreached_;  ///< candidates that the planner failed on
+  int candidates_max_;
+  Planner planner_;
+  FixedVector<JointVector, 32> visited_;  ///< the latest looks
+};
+
+}  // namespace firstlook

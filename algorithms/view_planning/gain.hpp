@@ -1,0 +1,85 @@
+/// The expected gain of a look: unknown voxels along the rays that the arm's own body leaves free.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/view_planning/view_context.hpp"
+
+namespace firstlook {
+
+/// How finely a look is sampled for its gain.
+struct GainSampling {
+  int columns = 44;  ///< 1.3 degrees for a Kinect: a 5 cm voxel is met out to 2.2 m, and the reach zone ends before
+  int rows = 33;
+  int futile_max = 3;  ///< looks without result after which a voxel is taken to be solid or to give no return
+};
+
+/// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark surface).
+/// Without it a voxel that the sensor cannot resolve would attract the arm forever. Memory is taken at construction.
+class FutileLooks {
+ public:
+  explicit FutileLooks(const GridGeometry& geometry) : count_(geometry.count(), 0) {}
+  [[nodiscard]] int count(std::size_t index) const { return count_[index]; }
+  void add(std::size_t index) {
+    if (count_[index] < 255) ++count_[index];
+  }
+  void clear() { std::fill(count_.begin(), count_.end(), std::uint8_t{0}); }
+
+ private:
+  std::vector<std::uint8_t> count_;
+};
+
+/// Scratch of one worker.
+class GainWorker {
+ public:
+  GainWorker(const GridGeometry& geometry, std::size_t rays_max);
+  GainScratch scratch;
+  GainRays rays;  ///< those that the body leaves free
+};
+
+/// Counts gains on one map. The plane is built once for each choice, then any number of workers count on it.
+class GainModel {
+ public:
+  GainModel(const GridGeometry& geometry, const DepthSensor& sensor, const GainSampling& sampling = {});
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const GainSampling& sampling = {});
+
+  /// Reads map, zone and free space. Unknown voxels of the zone count; free ones that motion cannot use yet count as
+  /// `again`; voxels with futile_max futile looks stop rays like occupied ones.
+  void prepare(const ViewContext& context);
+
+  /// What a look at configuration q would tell on the prepared map. Rays end at the trusted range; nearer than the
+  /// sensor's minimum nothing counts; rays that meet the body are left out.
+  [[nodiscard]] ViewGain count(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) const;
+
+  /// After a look at q was integrated into the map: voxels that its rays meet first and that are still unknown, or free
+  /// but still not usable for motion, had a futile look. Call it once for each look; returns how many there were.
+  std::size_t remember_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker);
+
+  [[nodiscard]] const FutileLooks& futile() const { return futile_; }
+  [[nodiscard]] const DepthSensor& sensor() const { return sensor_; }
+  [[nodiscard]] const GainSampling& sampling() const { return sampling_; }
+  [[nodiscard]] GainWorker worker() const { return {geometry_, rays_.ends_m.size()}; }
+  /// Indices of unknown voxels of the zone that touch a free one and are not written off, ascending; from prepare().
+  [[nodiscard]] std::span<const std::uint32_t> frontier() const { return frontier_; }
+  [[nodiscard]] std::span<const std::uint8_t> plane() const { return plane_; }
+
+ private:
+  /// The rays that no capsule of the body blocks; lives in the worker when some are.
+  const GainRays& free_rays(const ViewContext& context, const LinkFrames& frames,
+                            const Transform<Base, Depth>& base_T_depth, GainWorker& worker) const;
+  void find_frontier(const ViewContext& context);
+
+  GridGeometry geometry_;
+  DepthSensor sensor_;
+  GainSampling sampling_;
+  GainRays rays_;
+  double half_cone_rad_ = 0;  ///< the widest ray off the optical axis
+  GainPlane plane_;
+  std::vector<std::uint32_t> frontier_;
+  FutileLooks futile_;
+};
+
+}  // namespace firstlook

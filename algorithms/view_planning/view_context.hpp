@@ -1,0 +1,42 @@
+/// What every choice of a view looks at: the arm, what it carries, where it may move, and what is known.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "algorithms/kinematics/speed.hpp"
+#include "algorithms/mapping/insertion.hpp"
+#include "algorithms/mapping/ray_cast.hpp"
+#include "algorithms/mapping/voxel_map.hpp"
+#include "algorithms/motion/certificate.hpp"
+
+namespace firstlook {
+
+/// References to things that must outlive it, all of one map geometry; cheap to make for one call.
+struct ViewContext {
+  const ArmModel& arm;
+  const Body& body;
+  const FreeSpace& space;  ///< its field was rebuilt from `map`; null before the first look
+  const Clearance& clearance;
+  const VoxelMap& map;
+  std::span<const std::uint8_t> zone;  ///< mark_reach_zone: the voxels whose knowledge counts
+  Transform<Flange, Depth> flange_T_depth;
+};
+
+/// What a view has to cost beside the move, and how fast the arm may be: the denominator of utility.
+struct ViewTiming {
+  SpeedLimits limits;
+  double settle_s = 0.4;  ///< flange ring-down
+  double look_s = 0.3;    ///< a few frames at 30 Hz
+};
+
+/// What a look from one place is expected to tell.
+struct ViewGain {
+  std::uint32_t unknown = 0;  ///< unknown voxels of the zone, each once: what coverage counts
+  std::uint32_t again = 0;    ///< seen free once, but motion needs a second pose (safety rule 1)
+
+  /// A voxel that needs its second look is half known for motion: it weighs a quarter of one that was never seen.
+  [[nodiscard]] double weight() const { return unknown + 0.25 * again; }
+};
+
+}  // namespace firstlook

@@ -1,0 +1,152 @@
+#include "algorithms/vision/board_pose.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "algorithms/vision/camera_model.hpp"
+#include "algorithms/vision/homography.hpp"
+#include "algorithms/vision/rotation.hpp"
+
+namespace firstlook {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+struct Normal {
+  Matrix6 jtj = Matrix6::Zero();
+  Vector6 jtr = Vector6::Zero();
+  double cost = 0;  ///< sum of squared residuals, px^2
+};
+
+struct Problem {
+  const CameraIntrinsics& camera;
+  const BoardSpec& board;
+  std::span<const Eigen::Vector2d> corners_px;
+};
+
+/// Normal equations at a pose; empty when a corner has no image from there.
+std::optional<Normal> linearize(const Problem& problem, const Pose& pose) {
+  Normal n;
+  for (int i = 0; i < problem.board.corners(); ++i) {
+    const Eigen::Vector3d turned = pose.linear() * problem.board.corner(i);
+    const auto projected = project_with_jacobian(problem.camera, turned + pose.translation());
+    if (!projected) return std::nullopt;
+    const Eigen::Vector2d residual = problem.corners_px[static_cast<std::size_t>(i)] - projected->pixel;
+    Eigen::Matrix<double, 2, 6> j;
+    j << projected->d_pixel_d_point, -projected->d_pixel_d_point * cross_matrix(turned);
+    n.jtj += j.transpose() * j;
+    n.jtr += j.transpose() * residual;
+    n.cost += residual.squaredNorm();
+  }
+  return n;
+}
+
+struct Refined {
+  Pose pose;
+  Normal normal;
+};
+
+std::optional<Refined> refine(const Problem& problem, Pose pose) {
+  constexpr int kIterationsMax = 40;
+  auto normal = linearize(problem, pose);
+  if (!normal) return std::nullopt;
+  double damping = 1e-4;
+  for (int i = 0; i < kIterationsMax && damping < 1e9; ++i) {
+    Matrix6 damped = normal->jtj;
+    damped.diagonal() *= 1 + damping;
+    const Vector6 step = damped.ldlt().solve(normal->jtr);
+    if (!step.allFinite()) return std::nullopt;
+    Pose next = pose;
+    next.translation() += step.head<3>();
+    next.linear() = rotation_exp(step.tail<3>()) * pose.linear();
+    const auto there = linearize(problem, next);
+    if (!there || there->cost > normal->cost) {
+      damping *= 10;
+      continue;
+    }
+    const bool settled = normal->cost - there->cost <= 1e-14 * normal->cost;
+    pose = next;
+    normal = there;
+    damping /= 10;
+    if (settled) break;
+  }
+  return Refined{pose, *normal};
+}
+
+/// Pose of the plane z = 0 from its homography to the normalised image (Zhang 2000, section 3.1).
+std::optional<Pose> pose_from_homography(const Eigen::Matrix3d& h) {
+  const double scale = 2 / (h.col(0).norm() + h.col(1).norm());
+  if (!std::isfinite(scale)) return std::nullopt;
+  const double sign = h(2, 2) < 0 ? -1 : 1;  // the board's origin lies in front of the camera
+  Eigen::Matrix3d columns;
+  columns.col(0) = sign * scale * h.col(0);
+  columns.col(1) = sign * scale * h.col(1);
+  columns.col(2) = columns.col(0).cross(columns.col(1));
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(columns, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Pose pose = Pose::Identity();
+  pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  if (pose.linear().determinant() < 0) return std::nullopt;
+  pose.translation() = sign * scale * h.col(2);
+  return pose;
+}
+
+/// The other pose of a plane that looks nearly the same: its normal mirrored at the line of sight (Schweighofer and
+/// Pinz 2006), its centre kept.
+Pose mirrored(const Pose& pose, const Eigen::Vector3d& center_in_board) {
+  const Eigen::Vector3d center = pose * center_in_board;
+  const Eigen::Vector3d sight = center.normalized();
+  const Eigen::Vector3d normal = pose.linear().col(2);
+  const Eigen::Vector3d other = 2 * normal.dot(sight) * sight - normal;
+  Pose result = Pose::Identity();
+  result.linear() = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix() * pose.linear();
+  result.translation() = center - result.linear() * center_in_board;
+  return result;
+}
+
+std::optional<Pose> start_pose(const Problem& problem) {
+  std::vector<Eigen::Vector2d> plane, normalized;
+  for (int i = 0; i < problem.board.corners(); ++i) {
+    const auto point = undistort(problem.camera, problem.corners_px[static_cast<std::size_t>(i)]);
+    if (!point) return std::nullopt;
+    plane.push_back(problem.board.corner(i).head<2>());
+    normalized.push_back(*point);
+  }
+  const auto h = fit_homography(plane, normalized);
+  return h ? pose_from_homography(*h) : std::nullopt;
+}
+
+}  // namespace
+
+Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board,
+                                      std::span<const Eigen::Vector2d> corners_px, double residual_max_px) {
+  if (const Status fine = check_board(board); !fine) return std::unexpected(fine.error());
+  if (!is_usable(camera)) return failure(Fault::kConfigBadValue, "camera intrinsics are not usable");
+  if (corners_px.size() != static_cast<std::size_t>(board.corners())) {
+    return failure(Fault::kBoardNotFound, "{} corners instead of {}", corners_px.size(), board.corners());
+  }
+  const Problem problem{camera, board, corners_px};
+  const auto start = start_pose(problem);
+  if (!start) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
+  std::optional<Refined> best = refine(problem, *start);
+  const auto other = refine(problem, mirrored(best ? best->pose : *start, board.center()));
+  if (other && (!best || other->normal.cost < best->normal.cost)) best = other;
+  if (!best) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
+
+  BoardPose result;
+  result.residual_rms_px = std::sqrt(best->normal.cost / (2.0 * board.corners()));
+  if (!(result.residual_rms_px <= residual_max_px)) {
+    return failure(Fault::kBoardNotFound, "corners off by {:.2f} px RMS from any pose of the board",
+                   result.residual_rms_px);
+  }
+  // Through a quaternion, so that rounding leaves no trace of scale or shear.
+  result.camera_T_board = Transform<Camera, Board>(Eigen::Quaterniond(best->pose.linear()), best->pose.translation());
+  result.unit_covariance = best->normal.jtj.inverse();
+  return result;
+}
+
+}  // namespace firstlook

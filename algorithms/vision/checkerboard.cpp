@@ -1,0 +1,266 @@
+/// The adapter to OpenCV's classic checkerboard search and corner refinement: its types and exceptions end here.
+#include "algorithms/vision/checkerboard.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "algorithms/vision/homography.hpp"
+#include "algorithms/vision/saddle_points.hpp"
+
+namespace firstlook {
+namespace {
+
+using Corners = std::vector<Eigen::Vector2d>;
+
+/// The corners as a grid of columns x rows.
+struct Grid {
+  const BoardSpec& board;
+  const Corners& px;
+  [[nodiscard]] const Eigen::Vector2d& at(int column, int row) const {
+    return px[static_cast<std::size_t>(row * board.inner_columns + column)];
+  }
+};
+
+double smallest_spacing_px(const Grid& g) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int row = 0; row < g.board.inner_rows; ++row) {
+    for (int column = 0; column < g.board.inner_columns; ++column) {
+      if (column > 0) smallest = std::min(smallest, (g.at(column, row) - g.at(column - 1, row)).norm());
+      if (row > 0) smallest = std::min(smallest, (g.at(column, row) - g.at(column, row - 1)).norm());
+    }
+  }
+  return smallest;
+}
+
+/// Largest distance of a corner from the middle of its two neighbours in a row or column, in their spacings.
+/// Perspective and lens distortion bend little over three corners; a wrong corner stands out.
+double largest_local_residual(const Grid& g) {
+  double largest = 0;
+  const auto check = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+    largest = std::max(largest, ((a + c) / 2 - b).norm() / std::max(1e-9, (c - a).norm() / 2));
+  };
+  for (int row = 0; row < g.board.inner_rows; ++row) {
+    for (int column = 0; column < g.board.inner_columns; ++column) {
+      if (column > 1) check(g.at(column - 2, row), g.at(column - 1, row), g.at(column, row));
+      if (row > 1) check(g.at(column, row - 2), g.at(column, row - 1), g.at(column, row));
+    }
+  }
+  return largest;
+}
+
+/// OpenCV's search in one picture. No fast check: it misses visible boards (thesis, table D-8). No histogram
+/// equalisation: it finds no more boards and turns the noise of a plain wall into seconds of work.
+Corners search(const cv::Mat& picture, const BoardSpec& board) {
+  std::vector<cv::Point2f> found;
+  const cv::Size size(board.inner_columns, board.inner_rows);
+  if (!cv::findChessboardCorners(picture, size, found, cv::CALIB_CB_ADAPTIVE_THRESH)) return {};
+  if (found.size() != static_cast<std::size_t>(board.corners())) return {};
+  Corners corners;
+  for (const cv::Point2f& p : found) corners.emplace_back(p.x, p.y);
+  return corners;
+}
+
+/// Where corner-like points stand together in a small part of the picture, that part at twice the size: finds small
+/// boards that the whole picture's search misses, and costs little.
+Corners search_close_up(const cv::Mat& picture, const BoardSpec& board, const SaddlePoints& saddles) {
+  const int margin = std::max(saddles.right - saddles.left, saddles.bottom - saddles.top) / 3 + 8;
+  const cv::Rect around(saddles.left - margin, saddles.top - margin, saddles.right - saddles.left + 2 * margin,
+                        saddles.bottom - saddles.top + 2 * margin);
+  const cv::Rect part = around & cv::Rect(0, 0, picture.cols, picture.rows);
+  if (part.area() * 3 > picture.cols * picture.rows) return {};
+  cv::Mat large;
+  cv::resize(picture(part), large, cv::Size(), 2, 2, cv::INTER_LINEAR);
+  Corners corners = search(large, board);
+  for (Eigen::Vector2d& p : corners) {
+    p = ((p.array() + 0.5) / 2 - 0.5).matrix() + Eigen::Vector2d(part.x, part.y);
+  }
+  return corners;
+}
+
+/// The search in the picture scaled to `scale`; corners in full-size pixels.
+Corners search_scaled(const cv::Mat& image, const BoardSpec& board, double scale) {
+  cv::Mat scaled = image;
+  if (scale < 1) cv::resize(image, scaled, cv::Size(), scale, scale, cv::INTER_AREA);
+  const SaddlePoints saddles = find_saddle_points({scaled.data, scaled.cols, scaled.rows});
+  if (saddles.count < saddle_points_min(board.corners())) return {};
+  // More than one in a hundred pixels is noise, not a scene; searching it would take seconds.
+  if (saddles.count > scaled.cols * scaled.rows / 100) return {};
+  Corners corners = search_close_up(scaled, board, saddles);
+  if (corners.empty()) corners = search(scaled, board);
+  for (Eigen::Vector2d& p : corners) p = ((p.array() + 0.5) / scale - 0.5).matrix();
+  return corners;
+}
+
+void refine(const cv::Mat& image, const BoardSpec& board, double window_of_spacing, Corners& corners) {
+  const double spacing = smallest_spacing_px({board, corners});
+  const int half = std::clamp(static_cast<int>(std::lround(window_of_spacing * spacing)), 2, 40);
+  std::vector<cv::Point2f> points;
+  for (const auto& p : corners) points.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
+  cv::cornerSubPix(image, points, cv::Size(half, half), cv::Size(-1, -1),
+                   cv::TermCriteria(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 40, 0.001));
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = {points[i].x, points[i].y};
+}
+
+/// Board coordinates in squares -> pixels.
+std::optional<Eigen::Matrix3d> board_homography(const BoardSpec& board, const Corners& corners) {
+  Corners squares;
+  for (int i = 0; i < board.corners(); ++i) {
+    squares.emplace_back(i % board.inner_columns, i / board.inner_columns);
+  }
+  return fit_homography(squares, corners);
+}
+
+double grey_at(const cv::Mat& image, const Eigen::Vector2d& px) {
+  const int u = std::clamp(static_cast<int>(std::lround(px.x())), 0, image.cols - 1);
+  const int v = std::clamp(static_cast<int>(std::lround(px.y())), 0, image.rows - 1);
+  return image.at<std::uint8_t>(v, u);
+}
+
+/// How much darker the squares are that have the colour of the first one, mean in grey levels.
+double first_square_darkness(const cv::Mat& image, const Grid& g) {
+  double even = 0, odd = 0;
+  int evens = 0, odds = 0;
+  for (int row = 0; row + 1 < g.board.inner_rows; ++row) {
+    for (int column = 0; column + 1 < g.board.inner_columns; ++column) {
+      const Eigen::Vector2d middle =
+          (g.at(column, row) + g.at(column + 1, row) + g.at(column, row + 1) + g.at(column + 1, row + 1)) / 4;
+      if ((column + row) % 2 == 0) {
+        even += grey_at(image, middle);
+        ++evens;
+      } else {
+        odd += grey_at(image, middle);
+        ++odds;
+      }
+    }
+  }
+  return odd / odds - even / evens;
+}
+
+/// Makes x cross y point away from the viewer: mirrors the columns when the search went the other way round.
+void make_right_handed(const BoardSpec& board, Corners& corners) {
+  const Grid g{board, corners};
+  const Eigen::Vector2d x = g.at(board.inner_columns - 1, 0) - g.at(0, 0);
+  const Eigen::Vector2d y = g.at(0, board.inner_rows - 1) - g.at(0, 0);
+  if (x.x() * y.y() - x.y() * y.x() > 0) return;
+  for (int row = 0; row < board.inner_rows; ++row) {
+    const auto first = corners.begin() + row * board.inner_columns;
+    std::reverse(first, first + board.inner_columns);
+  }
+}
+
+/// Puts the first corner where the board's frame says. A turn by 180 degrees is the only choice left; the colours
+/// decide when they can, else the columns run to the right of the picture.
+void make_unique(const cv::Mat& image, const BoardSpec& board, Corners& corners) {
+  make_right_handed(board, corners);
+  const bool turn = board.is_orientation_unique() ? first_square_darkness(image, {board, corners}) < 0
+                                                  : (corners.back() - corners.front()).sum() < 0;
+  if (turn) std::reverse(corners.begin(), corners.end());
+}
+
+Result<CornerSet> check_corners(const cv::Mat& image, const BoardSpec& board, const DetectionOptions& options,
+                                const Corners& corners) {
+  const Grid grid{board, corners};
+  constexpr double kContrastMin = 8;  // grey levels between black and white squares
+  if (std::abs(first_square_darkness(image, grid)) < kContrastMin) {
+    return failure(Fault::kBoardNotFound, "the squares have no contrast");
+  }
+  const double local = largest_local_residual(grid);
+  if (!(local <= options.local_residual_max)) {
+    return failure(Fault::kBoardNotFound, "a corner lies {:.2f} squares off its neighbours", local);
+  }
+  const auto h = board_homography(board, corners);
+  if (!h) return failure(Fault::kBoardNotFound, "the corners do not span a plane");
+  CornerSet set{corners, 0};
+  for (int i = 0; i < board.corners(); ++i) {
+    const Eigen::Vector2d square(i % board.inner_columns, i / board.inner_columns);
+    set.residual_rms_px +=
+        (apply_homography(*h, square) - corners[static_cast<std::size_t>(i)]).squaredNorm() / board.corners();
+  }
+  set.residual_rms_px = std::sqrt(set.residual_rms_px);
+  return set;
+}
+
+Result<CornerSet> detect(const cv::Mat& image, const BoardSpec& board, const DetectionOptions& options) {
+  // Scaled down first: most boards are large enough, and the search is many times faster. Then once in twice the size.
+  Corners corners;
+  for (const int width : {options.search_width_max_px, 2 * options.search_width_max_px}) {
+    const double scale = std::min(1.0, static_cast<double>(width) / std::max(image.cols, image.rows));
+    corners = search_scaled(image, board, scale);
+    if (!corners.empty() || scale == 1) break;
+  }
+  if (corners.empty())
+    return failure(Fault::kBoardNotFound, "no {}x{} board seen whole", board.inner_columns, board.inner_rows);
+  refine(image, board, options.window_of_spacing, corners);
+  make_unique(image, board, corners);
+  return check_corners(image, board, options, corners);
+}
+
+}  // namespace
+
+Status check_board(const BoardSpec& board) {
+  if (board.inner_columns < 3 || board.inner_rows < 3 || board.inner_columns > kBoardCornersMax ||
+      board.inner_rows > kBoardCornersMax || board.corners() > kBoardCornersMax) {
+    return failure(Fault::kConfigBadValue, "a board of {}x{} inner corners: 3 at least each way, {} at most in all",
+                   board.inner_columns, board.inner_rows, kBoardCornersMax);
+  }
+  if (!(board.square_size_m > 0 && board.square_size_m <= 10)) {
+    return failure(Fault::kConfigBadValue, "a board with squares of {} m", board.square_size_m);
+  }
+  return {};
+}
+
+Result<CornerSet> detect_checkerboard(GrayImage image, const BoardSpec& board, const DetectionOptions& options) {
+  if (const Status fine = check_board(board); !fine) return std::unexpected(fine.error());
+  if (image.data == nullptr || image.width < 32 || image.height < 32 || image.width > 8192 || image.height > 8192) {
+    return failure(Fault::kDataMalformed, "an image of {}x{} pixels", image.width, image.height);
+  }
+  try {
+    cv::setNumThreads(1);  // results and memory must not depend on the number of cores
+    // OpenCV has no read-only header for foreign pixels; nothing below writes to it.
+    const cv::Mat header(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data));
+    return detect(header, board, options);
+  } catch (const cv::Exception& e) {
+    return failure(Fault::kBoardNotFound, "OpenCV: {}", e.err);
+  } catch (const std::bad_alloc&) {
+    return failure(Fault::kOutOfMemory, "searching the board in {}x{} pixels", image.width, image.height);
+  }
+}
+
+Result<CornerSet> average_corners(std::span<const CornerSet> frames, double agreement_max_px) {
+  if (frames.empty()) return failure(Fault::kBoardNotFound, "no frame");
+  const std::size_t count = frames[0].corners_px.size();
+  for (const CornerSet& frame : frames) {
+    if (frame.corners_px.size() != count) return failure(Fault::kBoardNotFound, "frames with different boards");
+  }
+  Corners median(count);
+  std::vector<double> values(frames.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int axis = 0; axis < 2; ++axis) {
+      for (std::size_t f = 0; f < frames.size(); ++f) values[f] = frames[f].corners_px[i][axis];
+      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+      median[i][axis] = values[values.size() / 2];
+    }
+  }
+  CornerSet mean{Corners(count, Eigen::Vector2d::Zero()), 0};
+  std::size_t agreeing = 0;
+  for (const CornerSet& frame : frames) {
+    double distance2 = 0;
+    for (std::size_t i = 0; i < count; ++i) distance2 += (frame.corners_px[i] - median[i]).squaredNorm();
+    if (!(distance2 <= agreement_max_px * agreement_max_px * static_cast<double>(count))) continue;
+    for (std::size_t i = 0; i < count; ++i) mean.corners_px[i] += frame.corners_px[i];
+    mean.residual_rms_px += frame.residual_rms_px;
+    ++agreeing;
+  }
+  if (agreeing * 2 < frames.size() || agreeing == 0) {
+    return failure(Fault::kBoardNotFound, "only {} of {} frames agree: the arm or the board moves", agreeing,
+                   frames.size());
+  }
+  for (Eigen::Vector2d& p : mean.corners_px) p /= static_cast<double>(agreeing);
+  mean.residual_rms_px /= static_cast<double>(agreeing);
+  return mean;
+}
+
+}  // namespace firstlook

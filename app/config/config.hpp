@@ -1,0 +1,128 @@
+/// Everything that an operator can set, as plain values with the defaults that a cart starts with.
+/// app/config/config_keys.cpp holds the one table of keys: name, limits and meaning of every field below.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "platform/core/joint_vector.hpp"
+
+namespace firstlook {
+
+struct Config {
+  std::string cell = "workshop";  ///< simulated cell: a built-in name, random:SEED, or a YAML file
+  std::int64_t seed = 1;
+  int workers = 2;
+  std::string start_source = "pendant";  ///< pendant | panel
+
+  struct Arm {
+    std::string model = "ur5";
+    double speed_max_m_s = 0.25;  ///< of every point of the body (safety rule 8)
+    double speed_max_rad_s = 1.0;
+    double acceleration_rad_s2 = 1.4;
+    bool operator==(const Arm&) const = default;
+  } arm;
+
+  struct SafeZone {
+    double radius_m = 0.5;
+    double height_m = 1.15;  ///< above the cart's top
+    bool operator==(const SafeZone&) const = default;
+  } safe_zone;
+
+  struct Cart {
+    double top_m = -0.02;  ///< z of the cart's own top in base
+    bool operator==(const Cart&) const = default;
+  } cart;
+
+  struct BaseAllowance {  ///< cylinder about axis 1 where links 0 and 1 are at home (safety rule 3)
+    double radius_m = 0.30;
+    double height_m = 0.25;
+    bool operator==(const BaseAllowance&) const = default;
+  } base_allowance;
+
+  struct KeepOut {  ///< axis-aligned box in base that nothing may enter
+    std::array<double, 3> low_m{};
+    std::array<double, 3> high_m{};
+    bool operator==(const KeepOut&) const = default;
+  };
+  std::vector<KeepOut> keep_out;  ///< at most 16
+
+  double camera_envelope_radius_m = 0.20;
+  std::optional<JointVector> parking_rad;  ///< empty: the arm's default start
+
+  struct Board {
+    std::string type = "checkerboard";
+    int inner_columns = 9;
+    int inner_rows = 6;
+    double square_size_m = 0.03;
+    bool operator==(const Board&) const = default;
+  } board;
+
+  struct Calibration {
+    std::string solver = "park-martin";  ///< closed form that starts the joint refinement
+    int views_min = 8;
+    int views_max = 30;
+    int holdout_views = 4;
+    double target_sigma_mm = 0.25;  ///< predicted, norm over the axes: enough views
+    double target_sigma_mrad = 0.50;
+    double settle_time_s = 0.4;  ///< flange ring-down below 0.1 mm
+    int frames_per_view = 3;
+    double corner_sigma_px = 0.10;  ///< used to predict; the solve estimates its own
+    double robot_sigma_mm = 0.10;   ///< repeatability of the arm, each axis; used to predict
+    double robot_sigma_mrad = 0.20;
+    double sigma_max_mm = 1.0;  ///< from here on the limits of the verdict
+    double sigma_max_mrad = 2.0;
+    double holdout_rms_max_px = 2.0;
+    double subset_spread_max_mm = 3.0;
+    double gripper_tolerance_m = 0.01;
+    double usable_distance_min_m = 0.3;
+    bool operator==(const Calibration&) const = default;
+  } calibration;
+
+  struct Depth {
+    double range_min_m = 0.5;
+    double range_max_m = 5.0;
+    double range_trusted_m = 3.0;
+    double noise_at_1m_m = 0.00285;  ///< times z²
+    bool operator==(const Depth&) const = default;
+  } depth;
+
+  struct Map {
+    double resolution_m = 0.05;
+    std::array<double, 3> low_m{-1.5, -1.5, -0.3};
+    std::array<double, 3> high_m{1.5, 1.5, 1.5};
+    double free_max_age_s = 600;
+    std::string holes = "ignore";
+    bool operator==(const Map&) const = default;
+  } map;
+
+  struct Explore {
+    int views_max = 60;
+    int candidates = 400;
+    int certificate_samples = 2000;
+    int cluster_voxels_min = 8;
+    double frames_while_moving_hz = 2;
+    bool operator==(const Explore&) const = default;
+  } explore;
+
+  struct Clearance {
+    double tracking_sigma_m = 0.0005;
+    double sag_m = 0.001;
+    double reaction_time_s = 0.016;  ///< two loop turns at 125 Hz
+    double deceleration_m_s2 = 2.5;  ///< at the body's outermost point
+    bool operator==(const Clearance&) const = default;
+  } clearance;
+
+  struct Memory {
+    int budget_mib = 256;
+    bool operator==(const Memory&) const = default;
+  } memory;
+
+  bool operator==(const Config&) const = default;
+};
+
+}  // namespace firstlook

@@ -1,0 +1,236 @@
+#include "app/config/config_keys.hpp"
+
+#include <fmt/format.h>
+
+namespace firstlook {
+namespace {
+
+constexpr std::string_view kStartSources[] = {"pendant", "panel"};
+constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"};
+constexpr std::string_view kBoardTypes[] = {"checkerboard"};
+constexpr std::string_view kSolvers[] = {"park-martin", "tsai-lenz"};
+constexpr std::string_view kHoles[] = {"ignore"};
+
+/// Every seed that a double of result.json's readers can hold exactly.
+constexpr double kSeedMax = 9007199254740992.0;
+
+using Keys = std::vector<ConfigKey>;
+
+void add_job_keys(Keys& keys, Config& c) {
+  keys.push_back({"cell", &c.cell, 0, 0, {}, "simulated cell: a built-in name, random:SEED, or a YAML file"});
+  keys.push_back({"seed", &c.seed, 0, kSeedMax, {}, "of every random number: one seed, one result"});
+  keys.push_back({"workers", &c.workers, 1, 16, {}, "threads for heavy work; the result is the same for any number"});
+  keys.push_back({"start_source", &c.start_source, 0, 0, kStartSources,
+                  "what starts a job: Play on the pendant, or the panel's button within 60 s of Play"});
+}
+
+void add_arm_keys(Keys& keys, Config& c) {
+  keys.push_back({"arm.model", &c.arm.model, 0, 0, kArmModels, "arm on the cart"});
+  keys.push_back({"arm.speed_max_m_s", &c.arm.speed_max_m_s, 0.01, 1.0, {}, "limit for every point of the body"});
+  keys.push_back({"arm.speed_max_rad_s", &c.arm.speed_max_rad_s, 0.01, 3.14, {}, "limit for every joint"});
+  keys.push_back({"arm.acceleration_rad_s2", &c.arm.acceleration_rad_s2, 0.05, 10, {}, "of every joint"});
+  keys.push_back({"parking_rad",
+                  &c.parking_rad,
+                  -6.2832,
+                  6.2832,
+                  {},
+                  "joints where a job ends, inside the safe zone; null: the arm's own default"});
+}
+
+void add_space_keys(Keys& keys, Config& c) {
+  keys.push_back({"safe_zone.radius_m",
+                  &c.safe_zone.radius_m,
+                  0.1,
+                  2.0,
+                  {},
+                  "cylinder about axis 1 that you vouch for: nobody and nothing may be in it"});
+  keys.push_back({"safe_zone.height_m", &c.safe_zone.height_m, 0.1, 3.0, {}, "of that cylinder above the cart's top"});
+  keys.push_back({"cart.top_m", &c.cart.top_m, -1.0, 0.0, {}, "z of the cart's own top in the arm's base frame"});
+  keys.push_back({"base_allowance.radius_m",
+                  &c.base_allowance.radius_m,
+                  0.05,
+                  0.6,
+                  {},
+                  "cylinder about axis 1 in which the arm's own base may touch unknown space"});
+  keys.push_back({"base_allowance.height_m", &c.base_allowance.height_m, 0.0, 0.8, {}, "of that cylinder above base"});
+  keys.push_back({"keep_out",
+                  &c.keep_out,
+                  -10,
+                  10,
+                  {},
+                  "boxes in base that nothing may enter: [{low_m: [x, y, z], high_m: [x, y, z]}, ...], at most 16"});
+  keys.push_back({"camera_envelope_radius_m",
+                  &c.camera_envelope_radius_m,
+                  0.02,
+                  0.6,
+                  {},
+                  "sphere at the flange that holds camera and gripper until the calibration is accepted"});
+}
+
+void add_calibration_keys(Keys& keys, Config& c) {
+  Config::Calibration& k = c.calibration;
+  keys.push_back({"board.type", &c.board.type, 0, 0, kBoardTypes, "kind of calibration board"});
+  keys.push_back({"board.inner_columns",
+                  &c.board.inner_columns,
+                  3,
+                  30,
+                  {},
+                  "inner corners along a row; odd x even avoids a half-turn ambiguity"});
+  keys.push_back({"board.inner_rows", &c.board.inner_rows, 3, 30, {}, "inner corners along a column"});
+  keys.push_back(
+      {"board.square_size_m", &c.board.square_size_m, 0.002, 0.5, {}, "side of one square: measure the print"});
+  keys.push_back({"calibration.solver", &k.solver, 0, 0, kSolvers, "closed form that starts the joint refinement"});
+  keys.push_back({"calibration.views_min", &k.views_min, 3, 60, {}, "views of the board to take at least"});
+  keys.push_back({"calibration.views_max", &k.views_max, 3, 60, {}, "and at most"});
+  keys.push_back({"calibration.holdout_views", &k.holdout_views, 0, 20, {}, "views kept out of the solve, to test it"});
+  keys.push_back({"calibration.target_sigma_mm",
+                  &k.target_sigma_mm,
+                  0.01,
+                  10,
+                  {},
+                  "predicted standard deviation at which views suffice"});
+  keys.push_back({"calibration.target_sigma_mrad", &k.target_sigma_mrad, 0.01, 20, {}, "the same of the rotation"});
+  keys.push_back({"calibration.settle_time_s", &k.settle_time_s, 0.0, 5.0, {}, "wait after a motion before looking"});
+  keys.push_back({"calibration.frames_per_view", &k.frames_per_view, 1, 8, {}, "frames averaged for one view"});
+  keys.push_back({"calibration.corner_sigma_px",
+                  &k.corner_sigma_px,
+                  0.005,
+                  5,
+                  {},
+                  "expected noise of a detected corner: predicts what a view will bring"});
+  keys.push_back({"calibration.robot_sigma_mm",
+                  &k.robot_sigma_mm,
+                  0.001,
+                  10,
+                  {},
+                  "expected position noise of the arm for each axis"});
+  keys.push_back({"calibration.robot_sigma_mrad", &k.robot_sigma_mrad, 0.001, 20, {}, "the same of its orientation"});
+  keys.push_back({"calibration.sigma_max_mm",
+                  &k.sigma_max_mm,
+                  0.01,
+                  50,
+                  {},
+                  "limit of the verdict: standard deviation of the translation, worst axis"});
+  keys.push_back({"calibration.sigma_max_mrad", &k.sigma_max_mrad, 0.01, 100, {}, "the same of the rotation"});
+  keys.push_back({"calibration.holdout_rms_max_px",
+                  &k.holdout_rms_max_px,
+                  0.01,
+                  50,
+                  {},
+                  "limit of the verdict: error in views kept out of the solve"});
+  keys.push_back({"calibration.subset_spread_max_mm",
+                  &k.subset_spread_max_mm,
+                  0.01,
+                  50,
+                  {},
+                  "limit of the verdict: spread of solves on random subsets of the views"});
+  keys.push_back({"calibration.gripper_tolerance_m",
+                  &k.gripper_tolerance_m,
+                  0.0001,
+                  0.2,
+                  {},
+                  "what the gripper forgives; gives the usable distance"});
+  keys.push_back({"calibration.usable_distance_min_m",
+                  &k.usable_distance_min_m,
+                  0,
+                  10,
+                  {},
+                  "limit of the verdict: distance at which that tolerance must still hold"});
+}
+
+void add_map_keys(Keys& keys, Config& c) {
+  keys.push_back({"depth.range_min_m", &c.depth.range_min_m, 0.05, 5, {}, "nearest return that is used"});
+  keys.push_back({"depth.range_max_m", &c.depth.range_max_m, 0.2, 20, {}, "farthest return that is used"});
+  keys.push_back({"depth.range_trusted_m",
+                  &c.depth.range_trusted_m,
+                  0.2,
+                  20,
+                  {},
+                  "returns beyond it clear the space up to it and mark nothing"});
+  keys.push_back({"depth.noise_at_1m_m",
+                  &c.depth.noise_at_1m_m,
+                  0.0001,
+                  0.1,
+                  {},
+                  "standard deviation of a return at 1 m; grows with the square of the distance"});
+  keys.push_back({"map.resolution_m", &c.map.resolution_m, 0.01, 0.2, {}, "side of a voxel"});
+  keys.push_back({"map.low_m", &c.map.low_m, -10, 10, {}, "corner of the map in base"});
+  keys.push_back({"map.high_m", &c.map.high_m, -10, 10, {}, "opposite corner"});
+  keys.push_back({"map.free_max_age_s",
+                  &c.map.free_max_age_s,
+                  1,
+                  86400,
+                  {},
+                  "free space not seen for so long counts as unknown for motion"});
+  keys.push_back({"map.holes", &c.map.holes, 0, 0, kHoles, "what a pixel without a return says: nothing"});
+  keys.push_back({"explore.views_max", &c.explore.views_max, 1, 500, {}, "views to take at most"});
+  keys.push_back({"explore.candidates", &c.explore.candidates, 10, 20000, {}, "configurations scored for each view"});
+  keys.push_back({"explore.certificate_samples",
+                  &c.explore.certificate_samples,
+                  100,
+                  100000,
+                  {},
+                  "configurations that must see nothing new before exploring ends"});
+  keys.push_back({"explore.cluster_voxels_min",
+                  &c.explore.cluster_voxels_min,
+                  1,
+                  10000,
+                  {},
+                  "smaller unknown clusters are left alone"});
+  keys.push_back(
+      {"explore.frames_while_moving_hz", &c.explore.frames_while_moving_hz, 0, 30, {}, "depth frames used on the way"});
+}
+
+void add_margin_keys(Keys& keys, Config& c) {
+  keys.push_back({"clearance.tracking_sigma_m",
+                  &c.clearance.tracking_sigma_m,
+                  0,
+                  0.05,
+                  {},
+                  "standard deviation of the arm's position at a frame's time stamp"});
+  keys.push_back({"clearance.sag_m", &c.clearance.sag_m, 0, 0.1, {}, "sag under payload"});
+  keys.push_back({"clearance.reaction_time_s", &c.clearance.reaction_time_s, 0, 1, {}, "from finding out to braking"});
+  keys.push_back({"clearance.deceleration_m_s2",
+                  &c.clearance.deceleration_m_s2,
+                  0.1,
+                  50,
+                  {},
+                  "of the outermost point of the body while it brakes"});
+  keys.push_back({"memory.budget_mib", &c.memory.budget_mib, 32, 65536, {}, "for everything but the simulated cell"});
+}
+
+}  // namespace
+
+std::vector<ConfigKey> config_keys(Config& config) {
+  Keys keys;
+  add_job_keys(keys, config);
+  add_arm_keys(keys, config);
+  add_space_keys(keys, config);
+  add_calibration_keys(keys, config);
+  add_map_keys(keys, config);
+  add_margin_keys(keys, config);
+  return keys;
+}
+
+std::string broken_rule(const Config& c) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (c.map.high_m[axis] - c.map.low_m[axis] < c.map.resolution_m) {
+      return "map.low_m must lie below map.high_m by at least one voxel on each axis";
+    }
+    for (const Config::KeepOut& box : c.keep_out) {
+      if (box.low_m[axis] > box.high_m[axis]) return "keep_out: low_m must not exceed high_m on any axis";
+    }
+  }
+  if (c.depth.range_min_m >= c.depth.range_trusted_m) return "depth.range_min_m must be below depth.range_trusted_m";
+  if (c.depth.range_trusted_m > c.depth.range_max_m) return "depth.range_trusted_m must not exceed depth.range_max_m";
+  if (c.calibration.views_min > c.calibration.views_max) {
+    return "calibration.views_min must not exceed calibration.views_max";
+  }
+  // Three views are the fewest that can determine a hand-eye transform (two motions about different axes).
+  if (c.calibration.views_min - c.calibration.holdout_views < 3) {
+    return "calibration.views_min must exceed calibration.holdout_views by at least 3";
+  }
+  return {};
+}
+
+}  // namespace firstlook

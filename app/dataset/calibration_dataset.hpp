@@ -1,0 +1,55 @@
+/// Recorded calibration views: a folder with board.yaml and poses with images, corners, or pose pairs.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algorithms/calibration/calibration_view.hpp"
+#include "algorithms/vision/checkerboard.hpp"
+#include "platform/core/camera_intrinsics.hpp"
+#include "platform/core/result.hpp"
+
+namespace firstlook {
+
+enum class CalibrationSource : std::uint8_t { kImages, kCorners, kPairs };
+
+/// One row of poses.csv.
+struct RecordedPose {
+  std::string image;
+  Transform<Base, Flange> base_T_flange;
+};
+
+/// Corners of one image, all of them, row by row.
+struct RecordedCorners {
+  std::string image;
+  std::vector<Eigen::Vector2d> corners_px;
+};
+
+/// What a calibration is solved from. `views` for images and corners, `pairs` for pairs.csv.
+struct CalibrationDataset {
+  CalibrationSource source = CalibrationSource::kImages;
+  BoardSpec board;  ///< with pairs.csv: what board.yaml says, or unset when there is none
+  CameraIntrinsics camera;
+  bool intrinsics_estimated = false;  ///< no camera_info.yaml: calibrated from the same images (Zhang 2000)
+  double intrinsics_rms_px = 0;       ///< of that calibration
+  std::vector<CalibrationView> views;
+  std::vector<std::string> names;  ///< one for each view
+  std::vector<PosePair> pairs;
+  std::vector<std::string> notes;  ///< for people: images left out and why
+};
+
+/// Reads the folder; corners.csv is preferred to images, pairs.csv is used when there is no poses.csv. Images in which
+/// the board is not found are left out with a note. Quaternions within 1e-3 of unit length are normalised, others
+/// refused.
+/// @return kDataMissing or kDataMalformed, naming file and line
+[[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder);
+
+/// board.yaml alone. @return kDataMissing, kDataMalformed
+[[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);
+
+/// camera_info.yaml as ROS writes it. @return kDataMissing, kDataMalformed
+[[nodiscard]] Result<CameraIntrinsics> read_camera_info(const std::filesystem::path& file);
+
+}  // namespace firstlook

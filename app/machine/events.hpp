@@ -1,0 +1,99 @@
+/// What can happen to the machine. Each event has one number on the loop and in the journal.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <variant>
+
+#include "app/machine/job_types.hpp"
+#include "hal/api/cameras.hpp"
+#include "hal/api/operator_devices.hpp"
+#include "hal/api/robot_arm.hpp"
+
+namespace firstlook {
+
+/// A report of the arm with the guardian's finding for it (safety rule 11: independent of the planner).
+struct ArmReported {
+  static constexpr std::uint16_t kKind = 16;
+  hal::ArmState state;
+  double guardian_margin_m = 0;  ///< how far the body stands inside known free space; negative: it does not
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(state.stamp, state.position_rad, state.velocity_rad_s, state.safety, state.program_running, state.moving,
+      state.segment, guardian_margin_m);
+  }
+};
+
+struct ColorFrameArrived {
+  static constexpr std::uint16_t kKind = 17;
+  hal::Frame frame;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(frame.stamp, frame.sequence, frame.slot);
+  }
+};
+
+struct DepthFrameArrived {
+  static constexpr std::uint16_t kKind = 18;
+  hal::Frame frame;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(frame.stamp, frame.sequence, frame.slot);
+  }
+};
+
+enum class OperatorDevice : std::uint8_t { kPendant, kPanel };
+
+struct OperatorActed {
+  static constexpr std::uint16_t kKind = 19;
+  OperatorDevice device = OperatorDevice::kPendant;
+  hal::OperatorAction action = hal::OperatorAction::kPlay;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(device, action);
+  }
+};
+
+/// The arm refused a command of ours.
+struct CommandRefused {
+  static constexpr std::uint16_t kKind = 20;
+  Fault fault = Fault::kInternal;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(fault);
+  }
+};
+
+/// SIGINT or SIGTERM, or the end of a virtual run's time.
+struct ShutdownAsked {
+  static constexpr std::uint16_t kKind = 21;
+  template <typename Archive>
+  void fields(Archive&) {}
+};
+
+/// What the machine waits for by time. The number is the timer's on the loop.
+enum class MachineTimer : std::uint32_t { kState = 0, kSettle = 1, kSupervise = 2 };
+
+struct TimerFired {
+  MachineTimer timer = MachineTimer::kState;
+};
+
+/// A job is done; `result` of the kind's type is unpacked by the state that asked for it.
+struct JobCompleted {
+  JobKind kind = JobKind::kPlan;
+  std::uint32_t number = 0;
+  std::span<const std::byte> result;
+};
+
+/// A frame together with the arm's joints at its stamp, made by the machine itself from arm reports around it.
+struct ColorPosed {
+  PosedFrame frame;
+};
+struct DepthPosed {
+  PosedFrame frame;
+};
+
+using MachineEvent = std::variant<ArmReported, ColorFrameArrived, DepthFrameArrived, OperatorActed, CommandRefused,
+                                  ShutdownAsked, TimerFired, JobCompleted, ColorPosed, DepthPosed>;
+
+}  // namespace firstlook

@@ -1,0 +1,226 @@
+/// The heavy work that the machine asks for: one struct of arguments and one of results for each kind of job. All are
+/// values: a job's result is an event like any other, so a replay needs no camera, no map and no solver.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "hal/api/cameras.hpp"
+#include "platform/core/fault_table.hpp"
+#include "platform/core/fixed_vector.hpp"
+#include "platform/core/joint_vector.hpp"
+
+namespace firstlook {
+
+enum class JobKind : std::uint16_t {
+  kLocateViews = 1,
+  kIdentifyMotions,
+  kPlan,
+  kDetectBoard,
+  kNextCalibrationView,
+  kSolve,
+  kValidate,
+  kIntegrate,
+  kNextSweepView,
+  kNextView,
+  kCertifyPath,
+  kCheckBoard,
+  kSummarize,
+};
+
+inline constexpr std::size_t kPathMax = 32;
+inline constexpr std::size_t kViewListMax = 64;
+
+/// One `movej` of a certified path.
+struct Leg {
+  JointVector target_rad;
+  double speed_rad_s = 0;
+  double acceleration_rad_s2 = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(target_rad, speed_rad_s, acceleration_rad_s2);
+  }
+};
+using Route = FixedVector<Leg, kPathMax>;
+
+/// Which body and which free space a motion is certified for (safety rules 2 and 3).
+enum class MotionPhase : std::uint8_t {
+  kBeforeCalibration,  ///< camera envelope, safe zone only
+  kMapping,            ///< calibrated camera, known free space of the map
+};
+
+struct NoArguments {
+  template <typename Archive>
+  void fields(Archive&) {}
+};
+
+struct FromHere {  ///< kLocateViews, kIdentifyMotions, kNextCalibrationView, kNextSweepView, kNextView
+  JointVector at_rad;
+  std::uint32_t step = 0;  ///< counts the calls of this kind; seeds the candidates
+  double now_s = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(at_rad, step, now_s);
+  }
+};
+
+struct ViewList {  ///< kLocateViews, kIdentifyMotions (outermost joint first)
+  FixedVector<JointVector, kViewListMax> views_rad;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(views_rad);
+  }
+};
+
+struct PlanArguments {  ///< kPlan, kCertifyPath (the path as it was chosen)
+  JointVector from_rad;
+  JointVector to_rad;
+  MotionPhase phase = MotionPhase::kBeforeCalibration;
+  std::uint32_t step = 0;
+  double now_s = 0;
+  Route path;  ///< only for kCertifyPath
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(from_rad, to_rad, phase, step, now_s, path);
+  }
+};
+
+struct PlanResult {
+  bool found = false;
+  Fault fault = Fault::kNoPath;  ///< why not
+  Route path;
+  double margin_m = 0;  ///< smallest proven margin along the path
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(found, fault, path, margin_m);
+  }
+};
+
+/// A frame with where the arm was at its stamp.
+struct PosedFrame {
+  hal::Frame frame;
+  JointVector at_rad;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(frame.stamp, frame.sequence, frame.slot, at_rad);
+  }
+};
+
+enum class BoardLook : std::uint8_t { kLocate, kIdentify, kCollect, kConclude };
+
+struct DetectArguments {  ///< kDetectBoard: detect in each frame, average, remember as view number `view` when found
+  BoardLook purpose = BoardLook::kLocate;
+  std::uint32_t view = 0;
+  FixedVector<PosedFrame, 8> frames;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(purpose, view, frames);
+  }
+};
+
+struct DetectResult {
+  bool found = false;
+  double rms_px = 0;
+  std::array<double, 3> camera_p_board_m{};        ///< origin of the board in the camera
+  std::array<double, 4> camera_q_board_xyzw{};     ///< rotation of the board in the camera
+  bool changed = false;  ///< against the first view of kIdentify: the image moved with the joint
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(found, rms_px, camera_p_board_m, camera_q_board_xyzw, changed);
+  }
+};
+
+struct CalibrationViewResult {
+  bool found = false;  ///< false: no reachable view helps
+  bool target_met = false;
+  Route path;
+  double sigma_mm = 0;    ///< predicted standard deviation after the views taken so far (norm over axes)
+  double sigma_mrad = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(found, target_met, path, sigma_mm, sigma_mrad);
+  }
+};
+
+struct SolveResult {
+  bool solved = false;
+  Fault fault = Fault::kSolveFailed;
+  std::array<double, 3> translation_m{};
+  std::array<double, 4> quaternion_xyzw{};
+  double sigma_mm = 0;
+  double sigma_mrad = 0;
+  double reprojection_rms_px = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(solved, fault, translation_m, quaternion_xyzw, sigma_mm, sigma_mrad, reprojection_rms_px);
+  }
+};
+
+struct ValidateResult {
+  bool accepted = false;
+  double holdout_rms_px = 0;
+  double usable_distance_m = 0;
+  double clearance_m = 0;  ///< of safety rule 5, with this calibration
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(accepted, holdout_rms_px, usable_distance_m, clearance_m);
+  }
+};
+
+struct IntegrateArguments {
+  PosedFrame frame;
+  double now_s = 0;
+  bool at_view = false;  ///< the look at a stop, not a frame on the way
+  JointVector arm_rad;   ///< where the arm is now
+  Route ahead;            ///< the legs that still lie ahead: they are certified again on the new map
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(frame, now_s, at_view, arm_rad, ahead);
+  }
+};
+
+struct IntegrateResult {
+  bool used = false;
+  bool path_free = true;  ///< the legs ahead are still certified
+  std::uint64_t unknown = 0, free = 0, occupied = 0;  ///< voxels of the mapped zone
+  std::uint64_t gained = 0;                           ///< unknown voxels of the zone that this frame made known
+  bool at_view = false;                               ///< as asked
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(used, path_free, unknown, free, occupied, gained, at_view);
+  }
+};
+
+struct NextViewResult {  ///< kNextSweepView, kNextView
+  bool found = false;    ///< false: the sweep is done, or no view sees more (ARCHITECTURE.md, termination)
+  Fault fault = Fault::kNothingReachable;
+  bool blocked = false;  ///< not found because the arm does not stand in known free space
+  Route path;
+  double gain_expected = 0;
+  std::uint32_t candidates = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(found, fault, blocked, path, gain_expected, candidates);
+  }
+};
+
+struct CheckBoardResult {
+  bool seen = false;
+  bool moved = false;
+  double shift_mm = 0;
+  double limit_mm = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(seen, moved, shift_mm, limit_mm);
+  }
+};
+
+struct SummarizeResult {
+  std::uint32_t clusters = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(clusters);
+  }
+};
+
+}  // namespace firstlook

@@ -1,0 +1,320 @@
+#include "app/machine/machine.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace firstlook {
+namespace {
+constexpr double kArrivedWithin_rad = 2e-3;      // of the target, at standstill: 20 times the encoders' resolution
+constexpr double kSupervisePeriod_s = 0.05;
+constexpr double kArmStale_s = 0.1;              // 12 reports at 125 Hz
+constexpr double kDepthStale_s = 0.5;            // 15 frames at 30 Hz
+constexpr double kSegmentAcceptedWithin_s = 0.2;  // else the leg counts as interrupted
+constexpr std::uint32_t kInterruptionsMax = 25;   // of one job; more means that the cell does not stand still
+}  // namespace
+
+Machine::Machine(const MachineSettings& settings, DecisionSink& sink) : settings_(settings), sink_(sink) {}
+
+void Machine::start(Instant now) {
+  now_ = now;
+  transition(StateId::kBoot);
+  run_transitions();
+}
+
+void Machine::on_event(Instant now, const MachineEvent& event) {
+  now_ = now;
+  if (finished_) return;
+  if (const auto* report = std::get_if<ArmReported>(&event)) remember_arm(*report);
+  if (const auto* frame = std::get_if<ColorFrameArrived>(&event)) {
+    color_seen_ = true;
+    pending_color_ = frame->frame;
+  }
+  if (const auto* frame = std::get_if<DepthFrameArrived>(&event)) {
+    depth_seen_ = true;
+    last_depth_ = now;
+    pending_depth_ = frame->frame;
+  }
+  dispatch(event);
+  if (std::holds_alternative<ArmReported>(event)) pose_pending_frames();
+}
+
+void Machine::dispatch(const MachineEvent& event) {
+  for (StateId at = state_; at != StateId::kNone; at = state_row(at).parent) {
+    const StateRow& row = state_row(at);
+    if (row.on_event != nullptr && row.on_event(*this, event) == Handled::kYes) {
+      run_transitions();
+      return;
+    }
+    if (pending_ != StateId::kNone) break;
+  }
+  run_transitions();
+  // Reports, frames, timers of states already left and results of jobs that nobody waits for any more are expected
+  // everywhere; a person's keys are handled by every outermost state. What is left has no place in the table.
+  if (std::holds_alternative<OperatorActed>(event) || std::holds_alternative<CommandRefused>(event)) {
+    if (!finished_ && state_ != StateId::kStopped && state_ != StateId::kFaulted) stop_for(Fault::kUnexpectedEvent);
+    run_transitions();
+  }
+}
+
+void Machine::transition(StateId target) { pending_ = target; }
+
+void Machine::run_transitions() {
+  while (pending_ != StateId::kNone) {
+    const StateId target = pending_;
+    pending_ = StateId::kNone;
+    if (state_ != StateId::kNone) {
+      bool allowed = false;
+      for (StateId at = state_; at != StateId::kNone; at = state_row(at).parent) {
+        for (const Transition& t : state_row(at).transitions) allowed = allowed || t.to == target;
+      }
+      ENSURE(7010, allowed);
+    }
+    enter_path_to(target);
+  }
+}
+
+void Machine::enter_path_to(StateId target) {
+  const StateId from = state_;
+  while (state_ != StateId::kNone && (state_ == target || !is_within(target, state_))) {
+    const StateRow& row = state_row(state_);
+    if (row.exit != nullptr) row.exit(*this);
+    state_ = row.parent;
+  }
+  awaited_ = 0;
+  looking_ = false;
+  if (travelling_) withdraw_trip();
+  FixedVector<StateId, 8> chain;
+  for (StateId at = target; at != StateId::kNone && at != state_; at = state_row(at).parent) chain.push_back(at);
+  for (std::size_t i = chain.size(); i-- > 0;) {
+    state_ = chain[i];
+    if (chain[i] == target || from == StateId::kNone || !is_within(from, chain[i])) {
+      sink_.state_entered(now_, state_);
+      if (state_row(state_).enter != nullptr) state_row(state_).enter(*this);
+    }
+    if (pending_ != StateId::kNone) return;
+  }
+}
+
+void Machine::conclude(Outcome outcome, std::optional<Fault> fault) {
+  progress_.ending = {outcome, fault.has_value(), fault.value_or(Fault::kInternal)};
+  transition(StateId::kPark);
+}
+
+void Machine::stop_for(Fault fault) {
+  sink_.stop_arm(now_);
+  sink_.stop_recorded(now_, fault);
+  progress_.ending = {fault == Fault::kUnexpectedEvent ? Outcome::kFaulted : Outcome::kSafelyStopped, true, fault};
+  transition(fault == Fault::kUnexpectedEvent ? StateId::kFaulted : StateId::kStopped);
+}
+
+void Machine::finish(const Ending& ending) {
+  if (finished_) return;
+  finished_ = true;
+  sink_.finished(now_, ending);
+}
+
+// ---- the arm's reports and the frames' poses
+
+void Machine::remember_arm(const ArmReported& report) {
+  if (history_size_ == kArmHistory) {
+    std::copy(history_.begin() + 1, history_.end(), history_.begin());
+    --history_size_;
+  }
+  history_[history_size_++] = report.state;
+  arm_ = report.state;
+  guardian_margin_m_ = report.guardian_margin_m;
+  arm_known_ = true;
+}
+
+std::optional<JointVector> Machine::joints_at(Instant stamp) const {
+  for (std::size_t i = history_size_; i-- > 1;) {
+    const hal::ArmState& before = history_[i - 1];
+    const hal::ArmState& after = history_[i];
+    if (before.stamp <= stamp && stamp <= after.stamp && before.stamp < after.stamp) {
+      const double t = (stamp - before.stamp).seconds() / (after.stamp - before.stamp).seconds();
+      return interpolate(before.position_rad, after.position_rad, t);
+    }
+  }
+  return std::nullopt;
+}
+
+void Machine::pose_pending_frames() {
+  if (pending_color_ && pending_color_->stamp <= arm_.stamp) {
+    const auto joints = joints_at(pending_color_->stamp);
+    const hal::Frame frame = *pending_color_;
+    pending_color_.reset();
+    if (joints) dispatch(ColorPosed{{frame, *joints}});
+  }
+  if (pending_depth_ && pending_depth_->stamp <= arm_.stamp) {
+    const auto joints = joints_at(pending_depth_->stamp);
+    const hal::Frame frame = *pending_depth_;
+    pending_depth_.reset();
+    if (joints) dispatch(DepthPosed{{frame, *joints}});
+  }
+}
+
+// ---- trips
+
+void Machine::start_trip(const Route& path, bool map_on_the_way) {
+  path_ = path;
+  leg_ = 0;
+  travelling_ = true;
+  map_on_the_way_ = map_on_the_way;
+  last_depth_ = now_;
+  last_way_frame_ = now_;
+  if (!path_.empty()) send_leg();
+  set_timer(MachineTimer::kSupervise, kSupervisePeriod_s);
+}
+
+void Machine::send_leg() {
+  const Leg& leg = path_[leg_];
+  leg_start_ = arm_.position_rad;
+  leg_sent_ = now_;
+  sink_.move_arm(now_, {++segment_number_, leg.target_rad, leg.speed_rad_s, leg.acceleration_rad_s2});
+}
+
+void Machine::withdraw_trip() {
+  if (!travelling_) return;
+  travelling_ = false;
+  cancel_timer(MachineTimer::kSupervise);
+  sink_.stop_arm(now_);
+}
+
+Machine::Trip Machine::interrupt_trip(Fault cause) {
+  withdraw_trip();
+  sink_.stop_recorded(now_, cause);
+  if (++progress_.interruptions > kInterruptionsMax) {
+    stop_for(cause);
+    return Trip::kNone;
+  }
+  return Trip::kInterrupted;
+}
+
+double Machine::deviation_m() const {
+  const JointVector way = path_[leg_].target_rad - leg_start_;
+  const JointVector here = arm_.position_rad - leg_start_;
+  double along = 0, length = 0;
+  for (int i = 0; i < way.size(); ++i) {
+    along += way[i] * here[i];
+    length += way[i] * way[i];
+  }
+  const double t = length > 0 ? std::clamp(along / length, 0.0, 1.0) : 0;
+  double deviation = 0;
+  for (int i = 0; i < way.size(); ++i) {
+    deviation += std::abs(here[i] - t * way[i]) * settings_.lever_arm_m[static_cast<std::size_t>(i)];
+  }
+  return deviation;
+}
+
+Route Machine::legs_ahead() const {
+  Route ahead;
+  if (!travelling_) return ahead;
+  for (std::size_t i = leg_; i < path_.size(); ++i) ahead.push_back(path_[i]);
+  return ahead;
+}
+
+Machine::Trip Machine::follow_leg() {
+  if (leg_ == path_.size()) {
+    travelling_ = false;
+    cancel_timer(MachineTimer::kSupervise);
+    return Trip::kArrived;
+  }
+  if (guardian_margin_m_ < 0) return interrupt_trip(Fault::kGuardianStop);
+  if (arm_.segment != segment_number_) {
+    return now_ - leg_sent_ > seconds(kSegmentAcceptedWithin_s) ? interrupt_trip(Fault::kDeviation) : Trip::kUnderWay;
+  }
+  if (deviation_m() > settings_.path_deviation_max_m) {
+    stop_for(Fault::kDeviation);
+    return Trip::kNone;
+  }
+  if (arm_.moving) return Trip::kUnderWay;
+  if ((arm_.position_rad - path_[leg_].target_rad).max_abs() > kArrivedWithin_rad) {
+    return now_ - leg_sent_ > seconds(kSegmentAcceptedWithin_s) ? interrupt_trip(Fault::kDeviation) : Trip::kUnderWay;
+  }
+  if (++leg_ < path_.size()) {
+    send_leg();
+    return Trip::kUnderWay;
+  }
+  travelling_ = false;
+  cancel_timer(MachineTimer::kSupervise);
+  return Trip::kArrived;
+}
+
+Machine::Trip Machine::advance_trip(const MachineEvent& event) {
+  if (!travelling_) return Trip::kNone;
+  if (std::holds_alternative<ArmReported>(event)) return follow_leg();
+  if (const auto* refused = std::get_if<CommandRefused>(&event)) return interrupt_trip(refused->fault);
+  if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kSupervise) {
+    set_timer(MachineTimer::kSupervise, kSupervisePeriod_s);
+    if (now_ - arm_.stamp > seconds(kArmStale_s)) {
+      stop_for(Fault::kLinkLost);
+    } else if (map_on_the_way_ && now_ - last_depth_ > seconds(kDepthStale_s)) {
+      stop_for(Fault::kStreamStale);
+    }
+    return Trip::kUnderWay;
+  }
+  if (const auto* posed = std::get_if<DepthPosed>(&event); posed && map_on_the_way_ && !integrating()) {
+    if (settings_.frames_while_moving_hz > 0 &&
+        posed->frame.frame.stamp - last_way_frame_ >= seconds(1 / settings_.frames_while_moving_hz)) {
+      last_way_frame_ = posed->frame.frame.stamp;
+      integrate(posed->frame, false);
+    }
+  }
+  if (const auto result = integrate_result(event); result && !result->path_free) {
+    return interrupt_trip(Fault::kNoPath);
+  }
+  return Trip::kUnderWay;
+}
+
+// ---- looks
+
+void Machine::start_look(bool depth, int count) {
+  looking_ = true;
+  look_open_ = false;
+  look_depth_ = depth;
+  look_count_ = static_cast<std::size_t>(count);
+  look_.clear();
+  set_timer(MachineTimer::kSettle, settings_.settle_time_s);
+}
+
+bool Machine::advance_look(const MachineEvent& event) {
+  constexpr double kFramesWithin_s = 3;  // a stream of 10 Hz brings eight frames in a third of it
+  if (!looking_) return false;
+  if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kSettle) {
+    if (look_open_) {
+      stop_for(Fault::kStreamStale);
+      return false;
+    }
+    look_open_ = true;
+    look_from_ = now_;
+    set_timer(MachineTimer::kSettle, kFramesWithin_s);
+    return false;
+  }
+  const PosedFrame* posed = nullptr;
+  if (const auto* color = std::get_if<ColorPosed>(&event); color && !look_depth_) posed = &color->frame;
+  if (const auto* depth = std::get_if<DepthPosed>(&event); depth && look_depth_) posed = &depth->frame;
+  if (posed == nullptr || !look_open_ || posed->frame.stamp < look_from_) return false;
+  look_.push_back(*posed);
+  if (look_.size() < look_count_) return false;
+  looking_ = false;
+  cancel_timer(MachineTimer::kSettle);
+  return true;
+}
+
+void Machine::integrate(const PosedFrame& frame, bool at_view) {
+  const std::uint32_t awaited = awaited_;
+  integrate_job_ =
+      start_job(JobKind::kIntegrate, IntegrateArguments{frame, now_.seconds(), at_view, arm_.position_rad, legs_ahead()});
+  awaited_ = awaited;
+}
+
+std::optional<IntegrateResult> Machine::integrate_result(const MachineEvent& event) {
+  const auto* done = std::get_if<JobCompleted>(&event);
+  if (done == nullptr || integrate_job_ == 0 || done->number != integrate_job_) return std::nullopt;
+  integrate_job_ = 0;
+  IntegrateResult result;
+  ENSURE(7003, unpack(done->result, result));
+  return result;
+}
+
+}  // namespace firstlook

@@ -1,0 +1,181 @@
+/// The hierarchical state machine of the job. Every decision is a function of the settings and the events, nothing else:
+/// no clock, no device, no map. Allocates nothing.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "app/machine/decisions.hpp"
+#include "app/machine/events.hpp"
+#include "app/machine/state_table.hpp"
+#include "platform/core/fixed_vector.hpp"
+#include "platform/journal/archive.hpp"
+
+namespace firstlook {
+
+enum class RunScope : std::uint8_t { kEverything, kCalibrate, kMap, kVerify };
+enum class StartSource : std::uint8_t { kPendant, kPanel };
+
+/// What of the configuration the machine decides by.
+struct MachineSettings {
+  RunScope scope = RunScope::kEverything;
+  StartSource start_source = StartSource::kPendant;
+  double settle_time_s = 0.4;
+  int frames_per_view = 3;
+  int calibration_views_min = 8;
+  int calibration_views_max = 30;
+  int verify_views = 3;  ///< a stored calibration is looked at from so many views before it is used
+  int explore_views_max = 60;
+  double frames_while_moving_hz = 2;
+  double path_deviation_max_m = 0.02;
+  std::array<double, kJointsMax> lever_arm_m{1.15, 1.15, 0.72, 0.32, 0.24, 0.14, 0.14};  ///< bound of FACTS for a UR5
+  JointVector parking_rad;  ///< where the job ends; inside the safe zone
+};
+
+/// What the machine remembers of the job, apart from the state itself.
+struct Progress {
+  ViewList views;              ///< of LocateBoard, later of IdentifyLink
+  std::uint32_t view = 0;      ///< position in `views`
+  std::uint32_t observations = 0;   ///< views of the board taken for the calibration
+  std::uint32_t failed_looks = 0;   ///< in a row, at calibration views
+  std::uint32_t steps = 0;          ///< of the current state: seeds its candidates
+  std::uint32_t sweep_views = 0;
+  std::uint32_t explore_views = 0;
+  std::uint32_t replans = 0;        ///< in a row, without a view between
+  std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
+  bool calibration_accepted = false;
+  JointVector board_view_rad;       ///< where the board was seen first; looked at again at the end
+  StateId resume = StateId::kNone;  ///< where a pause came from
+  Instant paused_at{};
+  Instant played_at{};
+  bool played = false;
+  Ending ending;
+  NextViewResult chosen;  ///< the view that Explore goes for
+};
+
+class Machine {
+ public:
+  Machine(const MachineSettings& settings, DecisionSink& sink);
+
+  /// Enters Boot. Call once, before the first event.
+  void start(Instant now);
+  void on_event(Instant now, const MachineEvent& event);
+
+  [[nodiscard]] StateId state() const { return state_; }
+  [[nodiscard]] bool finished() const { return finished_; }
+
+  // What the states use.
+  [[nodiscard]] Instant now() const { return now_; }
+  [[nodiscard]] const MachineSettings& settings() const { return settings_; }
+  [[nodiscard]] Progress& progress() { return progress_; }
+  [[nodiscard]] const hal::ArmState& arm() const { return arm_; }
+  [[nodiscard]] double guardian_margin_m() const { return guardian_margin_m_; }
+  [[nodiscard]] bool arm_known() const { return arm_known_; }
+  [[nodiscard]] bool color_seen() const { return color_seen_; }
+  [[nodiscard]] bool depth_seen() const { return depth_seen_; }
+
+  void transition(StateId target);
+  /// Ends the job by way of Park and Report: what is known so far is kept.
+  void conclude(Outcome outcome, std::optional<Fault> fault);
+  /// Stops the arm now and ends the job; only a person can start the next one.
+  void stop_for(Fault fault);
+
+  template <typename Arguments>
+  std::uint32_t start_job(JobKind kind, const Arguments& arguments) {
+    const std::size_t size = pack(arguments, std::span<std::byte>(arguments_));
+    ENSURE(7001, size > 0);
+    awaited_ = ++job_number_;
+    sink_.start_job(now_, kind, awaited_, std::span<const std::byte>(arguments_.data(), size));
+    return awaited_;
+  }
+  /// The result of the job that the state waits for; empty for every other event.
+  template <typename JobResult>
+  [[nodiscard]] std::optional<JobResult> result_of(JobKind kind, const MachineEvent& event) {
+    const auto* done = std::get_if<JobCompleted>(&event);
+    if (done == nullptr || done->kind != kind || done->number != awaited_) return std::nullopt;
+    awaited_ = 0;
+    JobResult result;
+    ENSURE(7002, unpack(done->result, result));
+    return result;
+  }
+  void set_timer(MachineTimer timer, double after_s) { sink_.set_timer(now_, timer, now_ + seconds(after_s)); }
+  void cancel_timer(MachineTimer timer) { sink_.cancel_timer(now_, timer); }
+  template <typename... Args>
+  void show(fmt::format_string<Args...> format, Args&&... args) {
+    std::array<char, 96> line;
+    const auto end = fmt::format_to_n(line.data(), line.size(), format, std::forward<Args>(args)...);
+    sink_.show(now_, {line.data(), std::min(end.size, line.size())});
+  }
+  void light(hal::Light light) { sink_.light(now_, light); }
+  void forget_known_free() { sink_.forget_known_free(now_); }
+  void finish(const Ending& ending);
+
+  /// The path being driven. Leg by leg: each is one segment without blend.
+  void start_trip(const Route& path, bool map_on_the_way);
+  enum class Trip : std::uint8_t { kNone, kUnderWay, kArrived, kInterrupted };
+  /// Feeds an event to the trip; kArrived and kInterrupted are reported once.
+  [[nodiscard]] Trip advance_trip(const MachineEvent& event);
+  void withdraw_trip();
+  [[nodiscard]] bool travelling() const { return travelling_; }
+
+  /// Waits until the arm has settled, then collects `count` frames with their poses.
+  void start_look(bool depth, int count);
+  [[nodiscard]] bool advance_look(const MachineEvent& event);  ///< true once, when the frames are there
+  [[nodiscard]] const FixedVector<PosedFrame, 8>& look() const { return look_; }
+
+  /// Starts an integration of a depth frame; its result comes to whoever is in charge then.
+  void integrate(const PosedFrame& frame, bool at_view);
+  [[nodiscard]] bool integrating() const { return integrate_job_ != 0; }
+  [[nodiscard]] std::optional<IntegrateResult> integrate_result(const MachineEvent& event);
+
+ private:
+  void dispatch(const MachineEvent& event);
+  void run_transitions();
+  void enter_path_to(StateId target);
+  void remember_arm(const ArmReported& report);
+  void pose_pending_frames();
+  [[nodiscard]] std::optional<JointVector> joints_at(Instant stamp) const;
+  void send_leg();
+  [[nodiscard]] double deviation_m() const;
+  [[nodiscard]] Route legs_ahead() const;
+  [[nodiscard]] Trip follow_leg();
+  [[nodiscard]] Trip interrupt_trip(Fault cause);
+
+  MachineSettings settings_;
+  DecisionSink& sink_;
+  Instant now_{};
+  StateId state_ = StateId::kNone;
+  StateId pending_ = StateId::kNone;
+  bool finished_ = false;
+  Progress progress_;
+
+  hal::ArmState arm_;
+  double guardian_margin_m_ = 0;
+  bool arm_known_ = false, color_seen_ = false, depth_seen_ = false;
+  static constexpr std::size_t kArmHistory = 64;
+  std::array<hal::ArmState, kArmHistory> history_{};
+  std::size_t history_size_ = 0;
+  std::optional<hal::Frame> pending_color_, pending_depth_;
+  Instant last_depth_{};
+
+  std::uint32_t job_number_ = 0;
+  std::uint32_t awaited_ = 0;
+  std::uint32_t integrate_job_ = 0;
+  std::array<std::byte, 8192> arguments_{};
+
+  bool travelling_ = false;
+  bool map_on_the_way_ = false;
+  Route path_;
+  std::size_t leg_ = 0;
+  JointVector leg_start_;
+  std::uint32_t segment_number_ = 0;
+  Instant leg_sent_{};
+  Instant last_way_frame_{};
+
+  bool looking_ = false, look_open_ = false, look_depth_ = false;
+  std::size_t look_count_ = 0;
+  Instant look_from_{};
+  FixedVector<PosedFrame, 8> look_;
+};
+
+}  // namespace firstlook

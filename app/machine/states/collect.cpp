@@ -1,0 +1,67 @@
+/// Collect: the views of the board from which the hand-eye transform is solved, each chosen for what it adds.
+#include "app/machine/states/states.hpp"
+
+namespace firstlook::states {
+namespace {
+constexpr std::uint32_t kFailedLooksMax = 8;  // in a row
+
+bool stored_calibration(Machine& m) {
+  return m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
+}
+
+void next_view(Machine& m) {
+  Progress& p = m.progress();
+  const auto enough = static_cast<std::uint32_t>(stored_calibration(m) ? m.settings().verify_views
+                                                                        : m.settings().calibration_views_max);
+  if (p.observations >= enough) {
+    m.transition(stored_calibration(m) ? StateId::kValidate : StateId::kSolve);
+    return;
+  }
+  m.start_job(JobKind::kNextCalibrationView, FromHere{m.arm().position_rad, p.steps++, m.now().seconds()});
+}
+
+void take(Machine& m, const CalibrationViewResult& choice) {
+  Progress& p = m.progress();
+  const bool enough = p.observations >= static_cast<std::uint32_t>(m.settings().calibration_views_min);
+  if (choice.target_met && enough && !stored_calibration(m)) {
+    m.transition(StateId::kSolve);
+  } else if (choice.found) {
+    m.show("calibration view {}: predicted sigma {:.2f} mm, {:.2f} mrad", p.observations + 1, choice.sigma_mm,
+           choice.sigma_mrad);
+    m.start_trip(choice.path, false);
+  } else if (enough && !stored_calibration(m)) {
+    m.transition(StateId::kSolve);
+  } else {
+    m.conclude(Outcome::kCalibrationRejected, Fault::kTooFewViews);
+  }
+}
+
+}  // namespace
+
+void enter_collect(Machine& m) { next_view(m); }
+
+Handled on_collect(Machine& m, const MachineEvent& event) {
+  Progress& p = m.progress();
+  if (const auto choice = m.result_of<CalibrationViewResult>(JobKind::kNextCalibrationView, event)) {
+    take(m, *choice);
+  } else if (m.advance_look(event)) {
+    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kCollect, p.observations, m.look()});
+  } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
+    if (seen->found) {
+      ++p.observations;
+      p.failed_looks = 0;
+    } else if (++p.failed_looks > kFailedLooksMax) {
+      m.conclude(Outcome::kCalibrationRejected, Fault::kBoardNotFound);
+      return Handled::kNo;
+    }
+    next_view(m);
+  }
+  switch (m.advance_trip(event)) {
+    case Machine::Trip::kArrived: m.start_look(false, m.settings().frames_per_view); break;
+    case Machine::Trip::kInterrupted: next_view(m); break;
+    default: break;
+  }
+  return Handled::kNo;
+}
+
+}  // namespace firstlook::states

@@ -1,0 +1,89 @@
+/// Explore: choose the next best view, certify the way, go there, look; until nothing more can be seen.
+#include "app/machine/states/states.hpp"
+
+namespace firstlook::states {
+namespace {
+constexpr std::uint32_t kReplansMax = 8;  // in a row, without a view between
+}
+
+void enter_choose(Machine& m) {
+  Progress& p = m.progress();
+  if (p.explore_views >= static_cast<std::uint32_t>(m.settings().explore_views_max) || p.replans > kReplansMax) {
+    m.transition(StateId::kVerifyBoard);
+    return;
+  }
+  m.start_job(JobKind::kNextView, FromHere{m.arm().position_rad, p.steps++, m.now().seconds()});
+}
+
+Handled on_choose(Machine& m, const MachineEvent& event) {
+  if (const auto choice = m.result_of<NextViewResult>(JobKind::kNextView, event)) {
+    Progress& p = m.progress();
+    p.chosen = *choice;
+    if (choice->found) {
+      m.transition(StateId::kPlan);
+    } else if (choice->blocked) {
+      ++p.replans;
+      m.transition(StateId::kLook);
+    } else {
+      m.transition(StateId::kVerifyBoard);
+    }
+  }
+  return Handled::kNo;
+}
+
+void enter_plan(Machine& m) {
+  PlanArguments plan;
+  plan.from_rad = m.arm().position_rad;
+  plan.phase = MotionPhase::kMapping;
+  plan.now_s = m.now().seconds();
+  plan.path = m.progress().chosen.path;
+  if (!plan.path.empty()) plan.to_rad = plan.path.back().target_rad;
+  m.start_job(JobKind::kCertifyPath, plan);
+}
+
+Handled on_plan(Machine& m, const MachineEvent& event) {
+  if (const auto plan = m.result_of<PlanResult>(JobKind::kCertifyPath, event)) {
+    if (plan->found) {
+      m.transition(StateId::kMove);
+    } else {
+      ++m.progress().replans;
+      m.transition(StateId::kChoose);
+    }
+  }
+  return Handled::kNo;
+}
+
+void enter_move(Machine& m) {
+  Progress& p = m.progress();
+  m.show("view {}: expecting {:.0f} new voxels", p.explore_views + 1, p.chosen.gain_expected);
+  m.start_trip(p.chosen.path, true);
+}
+
+Handled on_move(Machine& m, const MachineEvent& event) {
+  switch (m.advance_trip(event)) {
+    case Machine::Trip::kArrived:
+      m.progress().replans = 0;
+      m.transition(StateId::kLook);
+      break;
+    case Machine::Trip::kInterrupted:
+      ++m.progress().replans;
+      m.transition(StateId::kLook);
+      break;
+    default: break;
+  }
+  return Handled::kNo;
+}
+
+void enter_look(Machine& m) { m.start_look(true, 1); }
+
+Handled on_look(Machine& m, const MachineEvent& event) {
+  if (m.advance_look(event)) {
+    m.integrate(m.look()[0], true);
+  } else if (const auto result = m.integrate_result(event); result && result->at_view) {
+    ++m.progress().explore_views;
+    m.transition(StateId::kChoose);
+  }
+  return Handled::kNo;
+}
+
+}  // namespace firstlook::states

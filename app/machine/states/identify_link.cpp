@@ -1,0 +1,71 @@
+/// IdentifyLink: move joints from the outermost inwards; the first that moves the image carries the camera.
+#include <cmath>
+
+#include "app/machine/states/states.hpp"
+
+namespace firstlook::states {
+namespace {
+
+/// The joint that differs between two configurations the most.
+int moved_joint(const JointVector& from, const JointVector& to) {
+  int joint = 0;
+  for (int i = 1; i < to.size(); ++i) {
+    if (std::abs(to[i] - from[i]) > std::abs(to[joint] - from[joint])) joint = i;
+  }
+  return joint;
+}
+
+void next_motion(Machine& m) {
+  Progress& p = m.progress();
+  if (p.view >= p.views.views_rad.size()) {
+    m.conclude(Outcome::kCalibrationRejected, Fault::kCameraNotOnArm);
+    return;
+  }
+  const JointVector& target = p.views.views_rad[p.view];
+  m.show("identifying the camera's link, joint {}", moved_joint(p.board_view_rad, target) + 1);
+  plan_to(m, target, MotionPhase::kBeforeCalibration);
+}
+
+}  // namespace
+
+void enter_identify_link(Machine& m) {
+  m.progress().view = 0;
+  m.start_job(JobKind::kIdentifyMotions, FromHere{m.progress().board_view_rad, 0, m.now().seconds()});
+}
+
+Handled on_identify_link(Machine& m, const MachineEvent& event) {
+  Progress& p = m.progress();
+  if (const auto list = m.result_of<ViewList>(JobKind::kIdentifyMotions, event)) {
+    p.views = *list;
+    next_motion(m);
+  } else if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
+    if (plan->found) {
+      m.start_trip(plan->path, false);
+    } else {
+      ++p.view;
+      next_motion(m);
+    }
+  } else if (m.advance_look(event)) {
+    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kIdentify, p.view, m.look()});
+  } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
+    if (seen->found && seen->changed) {
+      const int joint = moved_joint(p.board_view_rad, p.views.views_rad[p.view]);
+      if (joint == m.arm().position_rad.size() - 1) {
+        m.transition(StateId::kCollect);
+      } else {
+        m.conclude(Outcome::kCalibrationRejected, Fault::kCameraOnInnerLink);
+      }
+    } else {
+      ++p.view;
+      next_motion(m);
+    }
+  }
+  switch (m.advance_trip(event)) {
+    case Machine::Trip::kArrived: m.start_look(false, 1); break;
+    case Machine::Trip::kInterrupted: next_motion(m); break;
+    default: break;
+  }
+  return Handled::kNo;
+}
+
+}  // namespace firstlook::states

@@ -1,0 +1,56 @@
+/// Running: what holds in every phase of the job. Consent and the controller's safety state are watched here.
+#include "app/machine/states/states.hpp"
+
+namespace firstlook::states {
+
+void enter_running(Machine& m) {
+  m.light(hal::Light::kAmber);
+  const hal::ArmSafety safety = m.arm().safety;
+  if (safety != hal::ArmSafety::kNormal && safety != hal::ArmSafety::kReduced) m.stop_for(Fault::kProtectiveStop);
+}
+
+namespace {
+void pause(Machine& m) {
+  m.progress().resume = m.state();
+  m.transition(StateId::kPaused);
+}
+}  // namespace
+
+Handled on_running(Machine& m, const MachineEvent& event) {
+  if (const auto* report = std::get_if<ArmReported>(&event)) {
+    const hal::ArmSafety safety = report->state.safety;
+    if (safety != hal::ArmSafety::kNormal && safety != hal::ArmSafety::kReduced) {
+      m.stop_for(Fault::kProtectiveStop);
+    } else if (!report->state.program_running) {
+      pause(m);
+    }
+    return Handled::kYes;
+  }
+  if (const auto* key = std::get_if<OperatorActed>(&event)) {
+    if (key->action == hal::OperatorAction::kStop) m.stop_for(Fault::kProgramStopped);
+    if (key->action == hal::OperatorAction::kPause) pause(m);
+    return Handled::kYes;
+  }
+  if (std::holds_alternative<ShutdownAsked>(event)) {
+    m.stop_for(Fault::kProgramStopped);
+    return Handled::kYes;
+  }
+  // A refusal that comes after its trip was withdrawn.
+  return std::holds_alternative<CommandRefused>(event) ? Handled::kYes : Handled::kNo;
+}
+
+MotionPhase phase_of(Machine& m) {
+  return m.progress().calibration_accepted ? MotionPhase::kMapping : MotionPhase::kBeforeCalibration;
+}
+
+void plan_to(Machine& m, const JointVector& target, MotionPhase phase) {
+  PlanArguments plan;
+  plan.from_rad = m.arm().position_rad;
+  plan.to_rad = target;
+  plan.phase = phase;
+  plan.step = m.progress().steps++;
+  plan.now_s = m.now().seconds();
+  m.start_job(JobKind::kPlan, plan);
+}
+
+}  // namespace firstlook::states

@@ -1,0 +1,24 @@
+/// Solve: the joint least squares over all views.
+#include "app/machine/states/states.hpp"
+
+namespace firstlook::states {
+
+void enter_solve(Machine& m) {
+  m.show("solving the calibration from {} views", m.progress().observations);
+  m.start_job(JobKind::kSolve, NoArguments{});
+}
+
+Handled on_solve(Machine& m, const MachineEvent& event) {
+  if (const auto result = m.result_of<SolveResult>(JobKind::kSolve, event)) {
+    if (result->solved) {
+      m.show("hand-eye sigma {:.2f} mm, {:.2f} mrad; reprojection {:.2f} px", result->sigma_mm, result->sigma_mrad,
+             result->reprojection_rms_px);
+      m.transition(StateId::kValidate);
+    } else {
+      m.conclude(Outcome::kCalibrationRejected, result->fault);
+    }
+  }
+  return Handled::kNo;
+}
+
+}  // namespace firstlook::states

@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "app/report/charts.hpp"
+#include "app/report/html.hpp"
+#include "app/report/png.hpp"
+#include "app/report/ros_files.hpp"
+#include "app/report/sections.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+std::string transform_table(const HandEyeResult& h) {
+  const auto row = [](std::string_view name, const Eigen::Vector3d& v, int digits) {
+    // Adding 0 turns -0 into 0.
+    return std::vector<std::string>{std::string(name), fmt::format("{:.{}f}", v.x() + 0.0, digits),
+                                    fmt::format("{:.{}f}", v.y() + 0.0, digits),
+                                    fmt::format("{:.{}f}", v.z() + 0.0, digits)};
+  };
+  HtmlTable table({"", "x", "y", "z"}, 1);
+  table.row(row("translation, mm", h.flange_T_camera.translation() * 1e3, 2));
+  table.row(row("± 1σ, mm", h.sigma_translation_m * 1e3, 3));
+  table.row(row("roll, pitch, yaw, degrees", roll_pitch_yaw(h.flange_T_camera.rotation()) * kDegrees, 3));
+  table.row(row("± 1σ about the flange's axes, mrad", h.sigma_rotation_rad * 1e3, 3));
+  return table.html();
+}
+
+std::string quality_table(const RunRecord& record) {
+  const HandEyeResult& h = *record.hand_eye;
+  HtmlTable table({"figure", "value", "what it says"}, 3);
+  if (!h.from_pairs) {
+    table.row({"reprojection error", fmt::format("{:.3f} px RMS", h.reprojection_rms_px),
+               "how well the views in the solve fit; small is necessary, not sufficient"});
+    table.row({"held-out reprojection error", fmt::format("{:.3f} px RMS", h.holdout_rms_px),
+               "in views that took no part in the solve, the arm's own error included"});
+  }
+  table.row({"held-out board position", fmt::format("{:.2f} mm RMS", h.holdout_rms_m * 1e3),
+             "where the other views put the board against where this one sees it"});
+  table.row({"spread over subsets",
+             fmt::format("{:.2f} mm, {:.2f} mrad", h.subset_spread_m * 1e3, h.subset_spread_rad * 1e3),
+             "RMS difference of solves on random subsets of the views"});
+  table.row({"the arm's pose noise",
+             fmt::format("{:.3f} mm, {:.3f} mrad", h.arm_sigma.translation_m * 1e3, h.arm_sigma.rotation_rad * 1e3),
+             "for each axis, estimated from the views"});
+  if (!h.from_pairs)
+    table.row({"corner noise", fmt::format("{:.3f} px", h.corner_sigma_px), "estimated from the views"});
+  table.row({"usable distance", fmt::format("{:.2f} m", h.usable_distance_m),
+             "farthest object at which a 3σ error stays within the gripper's tolerance"});
+  const auto gated = std::count_if(h.fits.begin(), h.fits.end(), [](const ViewFit& fit) { return !fit.used; });
+  table.row({"views", fmt::format("{} used, {} left out as wrong", h.views, gated),
+             fmt::format("closed form: {}", record.solver)});
+  return table.html();
+}
+
+std::string snippets(const HandEyeResult& h) {
+  if (h.verdict != Verdict::kAccepted)
+    return paragraph("No files for other programs are written from a rejected calibration.");
+  std::string html = "<h3>Use it</h3>\n";
+  html += "<p>ROS 2, now (the same as <code>ros/camera_transform.launch.py</code>):</p>\n<pre>" +
+          escape_html(ros2_static_transform_command(h.flange_T_camera)) + "</pre>\n";
+  html += "<p>URScript, camera in the flange (metres, rotation vector):</p>\n<pre>" +
+          escape_html("flange_T_camera = " + ur_pose_text(h.flange_T_camera)) + "</pre>\n";
+  html +=
+      "<p>easy_handeye2: copy <code>ros/easy_handeye2.calib</code> to "
+      "<code>~/.ros2/easy_handeye2/calibrations/firstlook.calib</code>; easy_handeye (ROS 1): "
+      "<code>ros/easy_handeye.yaml</code> to <code>~/.ros/easy_handeye/</code>. For a robot description, include "
+      "<code>ros/camera.xacro</code>.</p>\n"
+      "<p class=\"hint\">Mind the base: the controller's <code>base</code> (pendant, map files) and ROS "
+      "<code>base_link</code> share their origin but are turned by 180° about z. The camera's pose in the flange is "
+      "the "
+      "same for both; the map is not, so <code>ros/</code> holds the collision scene once for each.</p>\n";
+  return html;
+}
+
+/// The picture for the page: small, and with 64 grey levels, so that sensor noise does not fill the file.
+std::string picture_base64(const GrayPicture& whole, int width_max, CornerPicture& out) {
+  double scale = 1;
+  GrayPicture small = shrink(whole, width_max, scale);
+  for (std::uint8_t& pixel : small.pixels) pixel = static_cast<std::uint8_t>(pixel & 0xFC);
+  out.picture_width = small.width / scale;
+  out.picture_height = small.height / scale;
+  return base64(encode_png(small));
+}
+
+bool is_whole(const GrayPicture& p) {
+  return p.width > 0 && p.height > 0 &&
+         p.pixels.size() == static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height);
+}
+
+std::string view_figure(const CalibrationViewRecord& view, std::size_t number, const CameraIntrinsics& camera,
+                        int width_max) {
+  CornerPicture picture{std::max(1, camera.width), std::max(1, camera.height), 0, 0, {}};
+  if (is_whole(view.picture)) {
+    picture.width = view.picture.width;
+    picture.height = view.picture.height;
+    picture.png_base64 = picture_base64(view.picture, width_max, picture);
+  }
+  const Eigen::Vector3d flange = view.base_T_flange.translation();
+  return fmt::format(
+      "<figure class=\"shot\" id=\"view{0}\"><a href=\"#view{0}\">\n{1}</a>"
+      "<figcaption><b>{0}</b> · {2}{3}<br><span>{4} · flange at {5:.2f}, {6:.2f}, {7:.2f} m</span></figcaption>"
+      "<a class=\"close\" href=\"#calibration-views\">close</a></figure>\n",
+      number, corner_picture(view, picture),
+      view.reprojected_px.empty() ? std::string("not solved") : fmt::format("{:.3f} px", view.rms_px),
+      view.held_out ? " · held out" : "", duration_text(view.time_s), flange.x(), flange.y(), flange.z());
+}
+
+}  // namespace
+
+std::string hand_eye_section(const RunRecord& record) {
+  if (!record.hand_eye) {
+    return section("hand-eye", "Where the camera sits on the arm", paragraph("No calibration was solved in this run."));
+  }
+  const HandEyeResult& h = *record.hand_eye;
+  std::string body =
+      "<p>Pose of the camera (optical frame: z forward, x right, y down) in the flange <code>tool0</code>.</p>\n";
+  body += transform_table(h) + "<h3>How good it is</h3>\n" + quality_table(record);
+  body += snippets(h);
+  return section("hand-eye", "Where the camera sits on the arm", body);
+}
+
+std::string calibration_views_section(const RunRecord& record) {
+  const auto& views = record.calibration_views;
+  if (views.empty()) return {};
+  std::string body = "<div class=\"pair\">\n" + view_rms_chart(views) + residual_chart(views) + "</div>\n";
+  body +=
+      "<p class=\"hint\"><span class=\"key detected\">○</span> detected corners, <span class=\"key "
+      "reprojected\">+</span> "
+      "corners as the calibration predicts them. Select a picture to enlarge it.</p>\n<div class=\"shots\">\n";
+  // Fewer pixels for each picture when there are many of them, so that the page stays below some 3 MB.
+  const int width_max = views.size() <= 24 ? 320 : 240;
+  for (std::size_t i = 0; i < views.size(); ++i) body += view_figure(views[i], i + 1, record.intrinsics, width_max);
+  return section("calibration-views", "Views of the board", body + "</div>\n");
+}
+
+}  // namespace firstlook

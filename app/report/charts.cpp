@@ -1,0 +1,284 @@
+#include "app/report/charts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "app/report/html.hpp"
+
+namespace firstlook {
+namespace {
+
+// Colours that remain apart with the common kinds of colour blindness (Okabe and Ito 2008).
+constexpr std::string_view kBlue = "#0072b2", kOrange = "#d55e00", kGreen = "#009e73", kGrey = "#6b7280";
+
+/// 1, 2 or 5 times a power of ten: about `count` steps up to `top`.
+double nice_step(double top, int count) {
+  const double raw = std::max(top, 1e-12) / count;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (raw <= factor * power * 1.0001) return factor * power;
+  }
+  return 10 * power;
+}
+
+/// Places of a drawing area inside an SVG and the value ranges that it shows.
+struct Plot {
+  double left, top, width, height;
+  double x_low, x_high, y_high;  // y begins at 0
+  [[nodiscard]] double x(double value) const { return left + (value - x_low) / (x_high - x_low) * width; }
+  [[nodiscard]] double y(double value) const { return top + height - value / y_high * height; }
+  [[nodiscard]] double bottom() const { return top + height; }
+  [[nodiscard]] double right() const { return left + width; }
+};
+
+std::string svg_open(double width, double height, std::string_view label) {
+  return fmt::format("<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", width, height,
+                     label);
+}
+
+std::string text_at(double x, double y, std::string_view anchor, std::string_view text, std::string_view style = "") {
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}{}>{}</text>\n", x, y, anchor,
+                     style.empty() ? "" : " ", style, escape_html(text));
+}
+
+std::string line(double x1, double y1, double x2, double y2, std::string_view name) {
+  return fmt::format("<line class=\"{}\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n", name, x1, y1, x2,
+                     y2);
+}
+
+std::string axis_y(const Plot& plot, double step, auto&& label) {
+  std::string svg;
+  for (int i = 0; step * i <= plot.y_high * 1.0001; ++i) {
+    const double y = plot.y(step * i);
+    svg += line(plot.left, y, plot.right(), y, i == 0 ? "axis" : "grid");
+    svg += text_at(plot.left - 6, y + 4, "end", label(step * i));
+  }
+  return svg;
+}
+
+/// Labels at the right end of lines, moved apart where they would overlap.
+std::string end_labels(const Plot& plot, std::vector<std::pair<double, std::string>> labels) {
+  std::sort(labels.begin(), labels.end());
+  std::string svg;
+  double previous = -1e9;
+  // From the top down; the last may end up a little below its line, never on another label.
+  for (auto& [y, text] : labels) {
+    y = std::max(y, previous + 15);
+    previous = y;
+  }
+  const double overflow = std::max(0.0, previous - plot.bottom() - 4);
+  for (const auto& [y, text] : labels)
+    svg += fmt::format("{}", text_at(plot.right() + 8, y - overflow + 4, "start", text));
+  return svg;
+}
+
+std::string thousands(double value) {
+  return value >= 10000 ? fmt::format("{:.0f} k", value / 1000) : fmt::format("{:.0f}", value);
+}
+
+/// A word below the part of the plot that belongs to one phase, and a line where it begins.
+std::string phase_bands(const Plot& plot, std::span<const MappingViewRecord> views) {
+  std::string svg;
+  std::size_t start = 0;
+  for (std::size_t i = 1; i <= views.size(); ++i) {
+    if (i < views.size() && views[i].phase == views[start].phase) continue;
+    const double from = plot.x(static_cast<double>(start) + (start == 0 ? 1.0 : 0.5));
+    if (start > 0) svg += line(from, plot.top - 14, from, plot.bottom(), "mark");
+    svg += text_at(from + 4, plot.top - 5, "start", views[start].phase, "class=\"note\"");
+    start = i;
+  }
+  return svg;
+}
+
+}  // namespace
+
+std::string voxel_chart(std::span<const MappingViewRecord> views) {
+  if (views.empty()) return {};
+  struct Series {
+    std::string_view name, colour;
+    std::uint64_t MappingViewRecord::* count;
+  };
+  const std::array<Series, 3> all = {{{"unknown", kGrey, &MappingViewRecord::unknown},
+                                      {"free", kBlue, &MappingViewRecord::free},
+                                      {"occupied", kOrange, &MappingViewRecord::occupied}}};
+  std::uint64_t top = 1;
+  for (const MappingViewRecord& view : views) top = std::max({top, view.unknown, view.free, view.occupied});
+  const double step = nice_step(static_cast<double>(top), 5);
+  const double views_shown = std::max(2.0, static_cast<double>(views.size()));
+  const Plot plot{62, 26, 560, 260, 1, views_shown, step * std::ceil(static_cast<double>(top) / step)};
+
+  std::string svg = svg_open(760, 330, "Voxels unknown, free and occupied against the number of views");
+  svg += axis_y(plot, step, thousands);
+  const int view_step = std::max(1, static_cast<int>(nice_step(views_shown, 10)));
+  for (int i = view_step == 1 ? 1 : view_step; i <= static_cast<int>(views_shown); i += view_step) {
+    svg += text_at(plot.x(i), plot.bottom() + 18, "middle", fmt::format("{}", i));
+  }
+  svg += text_at(plot.left + plot.width / 2, plot.bottom() + 38, "middle", "view", "class=\"note\"");
+  svg += text_at(plot.left - 50, plot.top - 12, "start", "voxels", "class=\"note\"");
+  svg += phase_bands(plot, views);
+  std::vector<std::pair<double, std::string>> labels;
+  for (const Series& series : all) {
+    std::string points;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      points += fmt::format("{}{:.1f} {:.1f}", i == 0 ? "M" : "L", plot.x(static_cast<double>(i) + 1),
+                            plot.y(static_cast<double>(views[i].*series.count)));
+    }
+    svg += fmt::format("<path class=\"line\" stroke=\"{}\" d=\"{}\"/>\n", series.colour, points);
+    const std::uint64_t last = views.back().*series.count;
+    labels.emplace_back(plot.y(static_cast<double>(last)), fmt::format("{} {}", series.name, grouped(last)));
+    const double x = plot.x(static_cast<double>(views.size()));
+    svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\"/>\n", x,
+                       plot.y(static_cast<double>(last)), series.colour);
+  }
+  svg += end_labels(plot, std::move(labels));
+  return svg + "</svg>\n";
+}
+
+std::string view_rms_chart(std::span<const CalibrationViewRecord> views) {
+  if (views.empty()) return {};
+  double top = 0.01;
+  for (const CalibrationViewRecord& view : views) top = std::max(top, view.rms_px);
+  const double step = nice_step(top, 4);
+  const Plot plot{
+      48, 26, 430, 200, 0.5, static_cast<double>(views.size()) + 0.5, step * std::ceil(top / step * 0.9999)};
+  std::string svg = svg_open(490, 270, "Reprojection error of each calibration view");
+  svg += axis_y(plot, step, [](double v) { return fmt::format("{:.3g}", v); });
+  const double slot = plot.width / static_cast<double>(views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const double x = plot.x(static_cast<double>(i) + 1);
+    const double y = plot.y(views[i].rms_px);
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" rx=\"2\" fill=\"{}\"/>\n",
+                       x - slot * 0.36, y, slot * 0.72, plot.bottom() - y, views[i].held_out ? kOrange : kBlue);
+    if (views.size() <= 20 || (i + 1) % 5 == 0)
+      svg += text_at(x, plot.bottom() + 17, "middle", fmt::format("{}", i + 1));
+  }
+  svg += text_at(plot.left + plot.width / 2, plot.bottom() + 36, "middle", "calibration view", "class=\"note\"");
+  svg += text_at(4, 14, "start", "RMS, px", "class=\"note\"");
+  const bool any_held_out = std::any_of(views.begin(), views.end(), [](const auto& v) { return v.held_out; });
+  if (any_held_out) {
+    svg += fmt::format("<rect x=\"300\" y=\"4\" width=\"11\" height=\"11\" fill=\"{}\"/>", kBlue) +
+           text_at(316, 14, "start", "in the solve");
+    svg += fmt::format("<rect x=\"400\" y=\"4\" width=\"11\" height=\"11\" fill=\"{}\"/>", kOrange) +
+           text_at(416, 14, "start", "held out");
+  }
+  return svg + "</svg>\n";
+}
+
+std::string residual_chart(std::span<const CalibrationViewRecord> views) {
+  std::vector<Eigen::Vector2d> residuals;
+  std::vector<double> lengths;
+  for (const CalibrationViewRecord& view : views) {
+    if (view.held_out) continue;
+    for (std::size_t i = 0; i < std::min(view.detected_px.size(), view.reprojected_px.size()); ++i) {
+      const Eigen::Vector2d r = view.detected_px[i] - view.reprojected_px[i];
+      if (!r.allFinite()) continue;
+      residuals.push_back(r);
+      lengths.push_back(r.norm());
+    }
+  }
+  if (residuals.empty()) return {};
+  std::sort(lengths.begin(), lengths.end());
+  // The outermost ring holds 99 % of the dots; the rest stands on the rim.
+  const double reach = std::max(1e-3, lengths[lengths.size() * 99 / 100]);
+  const double ring = nice_step(reach, 3);
+  const double limit = ring * std::ceil(reach / ring * 0.9999);
+  constexpr double kCentre = 130, kRadius = 104;
+  std::string svg = svg_open(300, 270, "Reprojection error of every corner");
+  for (double r = ring; r <= limit * 1.0001; r += ring) {
+    svg += fmt::format("<circle class=\"ring\" cx=\"{}\" cy=\"{}\" r=\"{:.1f}\"/>\n", kCentre, kCentre,
+                       r / limit * kRadius);
+    svg +=
+        text_at(kCentre + 3, kCentre - r / limit * kRadius - 3, "start", fmt::format("{:.3g} px", r), "class=\"note\"");
+  }
+  svg += line(kCentre - kRadius, kCentre, kCentre + kRadius, kCentre, "grid");
+  svg += line(kCentre, kCentre - kRadius, kCentre, kCentre + kRadius, "grid");
+  std::string dots;
+  for (const Eigen::Vector2d& r : residuals) {
+    const double scale = std::min(1.0, limit / std::max(r.norm(), 1e-12)) / limit * kRadius;
+    dots += fmt::format("M{:.1f} {:.1f}h0", kCentre + r.x() * scale, kCentre + r.y() * scale);
+  }
+  svg += fmt::format("<path class=\"dots\" stroke=\"{}\" d=\"{}\"/>\n", kBlue, dots);
+  svg += text_at(kCentre, 262, "middle", fmt::format("{} corners", residuals.size()), "class=\"note\"");
+  return svg + "</svg>\n";
+}
+
+std::string phase_chart(std::span<const PhaseRecord> phases) {
+  if (phases.empty()) return {};
+  double begin = phases.front().start_s, end = phases.front().end_s;
+  for (const PhaseRecord& phase : phases) {
+    begin = std::min(begin, phase.start_s);
+    end = std::max(end, phase.end_s);
+  }
+  const double step = nice_step(std::max(end - begin, 1e-3), 8);
+  const double row = 24;
+  const Plot plot{120, 10, 560, row * static_cast<double>(phases.size()), begin, std::max(end, begin + 1e-3), 1};
+  std::string svg = svg_open(760, plot.bottom() + 30, "Phases of the job over time");
+  for (double t = step * std::ceil(begin / step); t <= end + 1e-9; t += step) {
+    svg += line(plot.x(t), plot.top, plot.x(t), plot.bottom(), "grid");
+    svg += text_at(plot.x(t), plot.bottom() + 18, "middle", fmt::format("{:g} s", t));
+  }
+  for (std::size_t i = 0; i < phases.size(); ++i) {
+    const double y = plot.top + row * static_cast<double>(i);
+    const double x = plot.x(phases[i].start_s);
+    const double width = std::max(2.0, plot.x(phases[i].end_s) - x);
+    svg += text_at(plot.left - 8, y + 16, "end", phases[i].name);
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" rx=\"3\" fill=\"{}\"/>\n", x,
+                       y + 5, width, kGreen);
+    svg +=
+        text_at(x + width + 5, y + 16, "start", duration_text(phases[i].end_s - phases[i].start_s), "class=\"note\"");
+  }
+  return svg + "</svg>\n";
+}
+
+std::string memory_chart(const MemoryRecord& memory) {
+  std::vector<PoolRecord> rows;
+  rows.push_back({"budget", memory.budget_bytes, memory.peak_bytes});
+  rows.insert(rows.end(), memory.pools.begin(), memory.pools.end());
+  std::uint64_t top = 1;
+  for (const PoolRecord& pool : rows) top = std::max({top, pool.reserved_bytes, pool.peak_bytes});
+  const double row = 24;
+  const Plot plot{190, 6, 360, row * static_cast<double>(rows.size()), 0, static_cast<double>(top), 1};
+  std::string svg = svg_open(760, plot.bottom() + 10, "Memory reserved and used");
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double y = plot.top + row * static_cast<double>(i);
+    const auto bar = [&](std::uint64_t bytes, std::string_view colour) {
+      svg += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" rx=\"3\" fill=\"{}\"/>\n",
+                         plot.left, y + 5, plot.x(static_cast<double>(bytes)) - plot.left, colour);
+    };
+    svg += text_at(plot.left - 8, y + 16, "end", rows[i].name);
+    bar(rows[i].reserved_bytes, "#d7dde5");
+    bar(rows[i].peak_bytes, rows[i].peak_bytes > rows[i].reserved_bytes ? kOrange : kGreen);
+    svg += text_at(plot.right() + 10, y + 16, "start",
+                   fmt::format("{} of {}", mib_text(rows[i].peak_bytes), mib_text(rows[i].reserved_bytes)));
+  }
+  return svg + "</svg>\n";
+}
+
+std::string corner_picture(const CalibrationViewRecord& view, const CornerPicture& picture) {
+  // Pixel centres are integers: the frame reaches from -0.5 to width - 0.5.
+  std::string svg =
+      fmt::format("<svg class=\"shot\" viewBox=\"-0.5 -0.5 {} {}\" role=\"img\" aria-label=\"calibration view\">\n",
+                  picture.width, picture.height);
+  svg += fmt::format("<rect x=\"-0.5\" y=\"-0.5\" width=\"{}\" height=\"{}\" fill=\"#2b3038\"/>\n", picture.width,
+                     picture.height);
+  if (!picture.png_base64.empty()) {
+    svg += fmt::format(
+        "<image x=\"-0.5\" y=\"-0.5\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" "
+        "href=\"data:image/png;base64,{}\"/>\n",
+        picture.picture_width, picture.picture_height, picture.png_base64);
+  }
+  std::string rings, crosses;
+  for (const Eigen::Vector2d& p : view.detected_px) {
+    if (p.allFinite()) rings += fmt::format("M{:.1f} {:.1f}a5 5 0 1 0 10 0a5 5 0 1 0-10 0", p.x() - 5, p.y());
+  }
+  for (const Eigen::Vector2d& p : view.reprojected_px) {
+    if (p.allFinite()) crosses += fmt::format("M{:.1f} {:.1f}h8m-4-4v8", p.x() - 4, p.y());
+  }
+  svg += fmt::format("<path class=\"detected\" d=\"{}\"/><path class=\"reprojected\" d=\"{}\"/>\n", rings, crosses);
+  return svg + "</svg>\n";
+}
+
+}  // namespace firstlook

@@ -1,0 +1,16 @@
+/// The hand_eye object of result.json.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+#include "algorithms/calibration/verdict.hpp"
+
+namespace firstlook {
+
+/// Every key of DESIGN 12 and, beside them, solver, arm_sigma, corner_sigma_px, subset_spread and ax_xb_residual. SI
+/// units unless the name says otherwise; numbers that do not apply (no corners) are null.
+[[nodiscard]] nlohmann::json hand_eye_json(const HandEyeResult& result, std::string_view parent_link,
+                                           std::string_view solver);
+
+}  // namespace firstlook

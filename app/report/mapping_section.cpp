@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "app/report/charts.hpp"
+#include "app/report/html.hpp"
+#include "app/report/png.hpp"
+#include "app/report/sections.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr std::size_t kClustersShown = 20;
+
+std::string litres(std::uint64_t voxels, double resolution_m) {
+  return fmt::format("{:.1f}", static_cast<double>(voxels) * resolution_m * resolution_m * resolution_m * 1e3);
+}
+
+std::string counts_table(const MappingRecord& m) {
+  const double total =
+      static_cast<double>(std::max<std::size_t>(1, m.voxels.unknown + m.voxels.free + m.voxels.occupied));
+  HtmlTable table({"class", "voxels", "litres", "share"}, 1);
+  const auto row = [&](std::string name, std::size_t count) {
+    table.row({std::move(name), grouped(count), litres(count, m.resolution_m),
+               fmt::format("{:.1f} %", 100 * static_cast<double>(count) / total)});
+  };
+  row("free", m.voxels.free);
+  row("occupied", m.voxels.occupied);
+  row("unknown", m.voxels.unknown);
+  return table.html();
+}
+
+std::string map_pictures(const std::vector<RgbPicture>& pictures) {
+  std::string html;
+  int number = 0;
+  for (const RgbPicture& picture : pictures) {
+    const std::vector<std::byte> png = encode_png(picture);
+    if (png.empty()) continue;
+    ++number;
+    html += fmt::format(
+        "<figure class=\"shot\" id=\"map{0}\"><a href=\"#map{0}\"><img alt=\"{1}\" width=\"{2}\" height=\"{3}\" "
+        "src=\"data:image/png;base64,{4}\"></a><figcaption>{1}</figcaption><a class=\"close\" "
+        "href=\"#map\">close</a></figure>\n",
+        number, escape_html(picture.caption), picture.width, picture.height, base64(png));
+  }
+  return html.empty() ? html : "<div class=\"maps\">\n" + html + "</div>\n";
+}
+
+std::string joints_text(const JointVector& joints_rad) {
+  std::string text;
+  for (int i = 0; i < joints_rad.size(); ++i) {
+    text += fmt::format("{}{:.0f}", i == 0 ? "" : "  ", joints_rad[i] * 180.0 / std::numbers::pi);
+  }
+  return text;
+}
+
+struct ReasonSum {
+  std::string reason;
+  std::uint64_t clusters = 0, voxels = 0;
+};
+
+std::vector<ReasonSum> sums_by_reason(const std::vector<RemainingRecord>& remaining) {
+  std::vector<ReasonSum> sums;
+  for (const RemainingRecord& cluster : remaining) {
+    auto sum = std::find_if(sums.begin(), sums.end(), [&](const ReasonSum& s) { return s.reason == cluster.reason; });
+    if (sum == sums.end()) sum = sums.insert(sums.end(), ReasonSum{cluster.reason});
+    ++sum->clusters;
+    sum->voxels += cluster.voxels;
+  }
+  std::stable_sort(sums.begin(), sums.end(),
+                   [](const ReasonSum& a, const ReasonSum& b) { return a.voxels > b.voxels; });
+  return sums;
+}
+
+}  // namespace
+
+std::string map_section(const RunRecord& record) {
+  if (!record.mapping) return section("map", "The map", paragraph("Nothing was mapped in this run."));
+  const MappingRecord& m = *record.mapping;
+  std::string body = map_pictures(record.map_pictures);
+  body += "<div class=\"figure\">\n" + voxel_chart(m.views) + "</div>\n" + counts_table(m);
+  body += fmt::format(
+      "<p class=\"hint\">Voxels of {:.0f} mm in the zone that the arm can reach. {} depth frames went into the map; {} "
+      "were "
+      "dropped because their pose or stamp could not be trusted.</p>\n",
+      m.resolution_m * 1e3, grouped(m.frames_integrated), grouped(m.frames_dropped));
+  body +=
+      "<p class=\"hint\">Files: <code>collision_map.bt</code> and <code>map.ot</code> (OctoMap), <code>map.ply</code> "
+      "(points), <code>ros/*.scene</code> (MoveIt). Unknown space is an obstacle: a planner must treat it so, "
+      "too.</p>\n";
+  return section("map", "The map", body);
+}
+
+std::string mapping_views_section(const RunRecord& record) {
+  if (!record.mapping || record.mapping->views.empty()) return {};
+  HtmlTable table({"view", "phase", "time", "joints, degrees", "gain expected", "voxels gained", "unknown left"}, 4);
+  int number = 0;
+  for (const MappingViewRecord& view : record.mapping->views) {
+    table.row({fmt::format("{}", ++number), view.phase, duration_text(view.time_s), joints_text(view.joints_rad),
+               fmt::format("{:.0f}", view.gain_expected), grouped(view.gain_seen), grouped(view.unknown)});
+  }
+  return section("views", "The views in order", table.html());
+}
+
+std::string remaining_section(const RunRecord& record) {
+  if (!record.mapping) return {};
+  const MappingRecord& m = *record.mapping;
+  if (m.remaining.empty()) {
+    return section("remaining", "What stays unknown", paragraph("No cluster of unknown voxels touches free space."));
+  }
+  HtmlTable sums({"why", "clusters", "voxels", "litres"}, 1);
+  for (const ReasonSum& sum : sums_by_reason(m.remaining)) {
+    sums.row({sum.reason, grouped(sum.clusters), grouped(sum.voxels), litres(sum.voxels, m.resolution_m)});
+  }
+  HtmlTable largest({"voxels", "litres", "centre in base, m", "why"}, 4);
+  for (std::size_t i = 0; i < std::min(kClustersShown, m.remaining.size()); ++i) {
+    const RemainingRecord& cluster = m.remaining[i];
+    largest.row(
+        {grouped(cluster.voxels), litres(cluster.voxels, m.resolution_m),
+         fmt::format("{:.2f}, {:.2f}, {:.2f}", cluster.center_m.x(), cluster.center_m.y(), cluster.center_m.z()),
+         cluster.reason});
+  }
+  std::string body =
+      "<p>Clusters of unknown voxels that touch free space. They are obstacles for every motion.</p>\n" + sums.html();
+  body += fmt::format("<details><summary>The largest {}</summary>\n{}</details>\n",
+                      std::min(kClustersShown, m.remaining.size()), largest.html());
+  return section("remaining", "What stays unknown", body);
+}
+
+}  // namespace firstlook

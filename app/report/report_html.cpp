@@ -1,0 +1,66 @@
+#include "app/report/report_html.hpp"
+
+#include <fmt/format.h>
+
+#include "app/report/html.hpp"
+#include "app/report/report_style.hpp"
+#include "app/report/sections.hpp"
+
+namespace firstlook {
+namespace {
+
+std::string head(const std::string& title) {
+  // The policy keeps the promise of the page: nothing is fetched and no script runs, whatever the data say.
+  std::string html =
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
+      "'unsafe-inline'\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+      title + "</title>\n<style>";
+  html += kReportStyle;
+  return html + "</style>\n</head>\n";
+}
+
+std::string navigation(const RunRecord& record) {
+  std::string html = "<nav>";
+  const auto link = [&](std::string_view id, std::string_view text) {
+    html += fmt::format("<a href=\"#{}\">{}</a>", id, text);
+  };
+  link("hand-eye", "Hand-eye");
+  if (!record.calibration_views.empty()) link("calibration-views", "Board views");
+  link("map", "Map");
+  if (record.mapping) {
+    link("views", "Views");
+    link("remaining", "Unknown");
+  }
+  link("safety", "Safety");
+  if (record.truth) link("truth", "Truth");
+  if (record.memory) link("memory", "Memory");
+  link("provenance", "Provenance");
+  return html + "</nav>\n";
+}
+
+}  // namespace
+
+std::string report_html(const RunRecord& record) {
+  const std::string title = fmt::format("firstlook report: {}, seed {}", escape_html(record.cell), record.seed);
+  std::string html = head(title);
+  html += fmt::format(
+      "<body>\n<main>\n<header><h1>Cell {}, seed {}</h1><span class=\"brand\">firstlook {} · report</span></header>\n",
+      escape_html(record.cell), record.seed, escape_html(record.provenance.version));
+  html += navigation(record);
+  html += summary_section(record);
+  html += hand_eye_section(record);
+  html += calibration_views_section(record);
+  html += map_section(record);
+  html += mapping_views_section(record);
+  html += remaining_section(record);
+  html += safety_section(record);
+  html += truth_section(record);
+  html += memory_section(record);
+  html += provenance_section(record);
+  html += wall_section(record);
+  return html + "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace firstlook

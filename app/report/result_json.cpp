@@ -1,0 +1,90 @@
+#include "app/report/result_json.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "app/report/hand_eye_json.hpp"
+#include "app/report/ros_files.hpp"
+
+namespace firstlook {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename T>
+Json or_null(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json phases_json(const RunRecord& record) {
+  Json phases = Json::array();
+  for (const PhaseRecord& phase : record.phases) {
+    phases.push_back({{"name", phase.name}, {"start_s", phase.start_s}, {"end_s", phase.end_s}});
+  }
+  return phases;
+}
+
+Json mapping_json(const MappingRecord& mapping) {
+  Json remaining = Json::array();
+  for (const RemainingRecord& cluster : mapping.remaining) {
+    remaining.push_back({{"voxels", cluster.voxels}, {"reason", cluster.reason}});
+  }
+  return {{"views", mapping.views.size()},
+          {"resolution_m", mapping.resolution_m},
+          {"voxels",
+           {{"unknown", mapping.voxels.unknown}, {"free", mapping.voxels.free}, {"occupied", mapping.voxels.occupied}}},
+          {"remaining", remaining}};
+}
+
+Json safety_json(const SafetyRecord& safety) {
+  Json stops = Json::array();
+  for (const StopRecord& stop : safety.stops) stops.push_back({{"time_s", stop.time_s}, {"cause", stop.cause}});
+  return {{"clearance_m", safety.clearance ? Json(safety.clearance->voxels_m) : Json(nullptr)},
+          {"min_clearance_m", or_null(safety.min_clearance_m)},
+          {"stops", stops}};
+}
+
+Json memory_json(const MemoryRecord& memory) {
+  return {{"budget_bytes", memory.budget_bytes},
+          {"peak_bytes", memory.peak_bytes},
+          {"loop_allocations_after_seal", memory.loop_allocations_after_seal}};
+}
+
+Json wall_json(const WallRecord& wall) {
+  return {{"started", wall.started},     {"total_s", wall.total_s}, {"stall_s", wall.stall_s},
+          {"rss_bytes", wall.rss_bytes}, {"folder", wall.folder},   {"workers", wall.workers}};
+}
+
+Json truth_json(const TruthRecord& truth) {
+  return {{"hand_eye_error_mm", or_null(truth.hand_eye_error_mm)},
+          {"hand_eye_error_mrad", or_null(truth.hand_eye_error_mrad)},
+          {"hand_eye_mahalanobis2", or_null(truth.hand_eye_mahalanobis2)},
+          {"contacts", truth.contacts},
+          {"unknown_entries", truth.unknown_entries},
+          {"coverage_of_observable", or_null(truth.coverage_of_observable)},
+          {"false_free_voxels", or_null(truth.false_free_voxels)}};
+}
+
+/// A cell from a file goes by the file's name: paths differ from machine to machine.
+std::string cell_name(const std::string& cell) { return cell.substr(cell.rfind('/') + 1); }
+
+}  // namespace
+
+std::string result_json(const RunRecord& record) {
+  Json json;
+  json["outcome"] = name_of(record.outcome);
+  json["reason"] = record.reason;
+  json["seed"] = record.seed;
+  json["cell"] = cell_name(record.cell);
+  json["phases"] = phases_json(record);
+  json["decisions_hash"] = record.decisions_hash;
+  json["hand_eye"] =
+      record.hand_eye ? Json(hand_eye_json(*record.hand_eye, kFlangeFrame, record.solver)) : Json(nullptr);
+  json["mapping"] = record.mapping ? mapping_json(*record.mapping) : Json(nullptr);
+  json["safety"] = record.safety ? safety_json(*record.safety) : Json(nullptr);
+  json["memory"] = record.memory ? memory_json(*record.memory) : Json(nullptr);
+  json["wall"] = wall_json(record.wall);
+  json["truth"] = record.truth ? truth_json(*record.truth) : Json(nullptr);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace firstlook

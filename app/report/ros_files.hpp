@@ -1,0 +1,46 @@
+/// The calibration and the map in the shapes that ROS tools read.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "algorithms/mapping/voxel_map.hpp"
+#include "platform/core/camera_intrinsics.hpp"
+#include "platform/core/transform.hpp"
+
+namespace firstlook {
+
+/// ROS names of our frames (ur_description, REP 103).
+inline constexpr std::string_view kFlangeFrame = "tool0";
+inline constexpr std::string_view kCameraFrame = "camera_color_optical_frame";
+inline constexpr std::string_view kCameraLinkFrame = "camera_link";  ///< x forward, z up
+
+/// A file of a folder: name relative to it, whole text.
+struct NamedFile {
+  std::string name;
+  std::string text;
+};
+
+/// easy_handeye (ROS 1) and easy_handeye2 calibrations, static transforms as launch files for ROS 1 and ROS 2, and a
+/// xacro, all of the same transform.
+[[nodiscard]] std::vector<NamedFile> ros_calibration_files(const Transform<Flange, Camera>& flange_T_camera);
+
+/// MoveIt planning scenes of occupied boxes given in the controller's base: one in `base_link` (what MoveIt plans in on
+/// a UR; turned by 180 degrees about z) and one in `base`.
+[[nodiscard]] std::vector<NamedFile> ros_scene_files(std::span<const AxisBox> occupied);
+
+/// The command that publishes the transform in a running ROS 2, ready to paste.
+[[nodiscard]] std::string ros2_static_transform_command(const Transform<Flange, Camera>& flange_T_camera);
+
+/// "p[x, y, z, rx, ry, rz]" as URScript has poses: metres and rotation vector.
+[[nodiscard]] std::string ur_pose_text(const Transform<Flange, Camera>& flange_T_camera);
+
+/// camera_info.yaml as camera_calibration_parsers reads and writes it: plumb_bob, no rectification.
+[[nodiscard]] std::string camera_info_yaml(const CameraIntrinsics& camera);
+
+/// Roll, pitch and yaw (rad) of R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has them; yaw is 0 where it is not determined.
+[[nodiscard]] Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& rotation);
+
+}  // namespace firstlook

@@ -1,0 +1,33 @@
+/// The folder of a run.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "algorithms/mapping/voxel_map.hpp"
+#include "app/report/run_record.hpp"
+#include "platform/core/result.hpp"
+
+namespace firstlook {
+
+/// Files of the map, made elsewhere; an empty one is not written.
+struct MapFiles {
+  std::string collision_map_bt;
+  std::string map_ot;
+  std::string map_ply;
+  std::vector<AxisBox> occupied;  ///< merge_occupied of the map, base frame: becomes ros/*.scene, once for each frame
+};
+
+/// Makes the folder of a run before the job starts, so that a full or forbidden place is found out early.
+/// @return kOutputNotEmpty when it exists and is not empty, kDiskWrite when it cannot be made
+[[nodiscard]] Status prepare_run_folder(const std::string& folder);
+
+/// Writes result.json, views.csv, report.html and, as far as the run got, hand_eye.yaml, camera_info.yaml, the map's
+/// files and ros/, each whole or not at all; result.json last, so that its presence means that the others are there.
+/// @return kDiskWrite with the file's name
+[[nodiscard]] Status write_run_files(const std::string& folder, const RunRecord& record, const MapFiles& map);
+
+/// views.csv: one row for each look of sweep and exploration.
+[[nodiscard]] std::string views_csv(const RunRecord& record);
+
+}  // namespace firstlook

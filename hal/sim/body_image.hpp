@@ -1,0 +1,38 @@
+/// The arm's capsules as a camera sees them: intersected by formula, only where their outline can be.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "algorithms/kinematics/arm_model.hpp"
+#include "platform/core/transform.hpp"
+
+namespace firstlook::sim {
+
+struct BodyHit {
+  double depth_m = 0;                                    ///< along the optical axis
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();      ///< unit, in the camera frame
+};
+
+/// Capsules in the frame of an eye that looks along z. Those that hold `eye` or `also_outside` are left out: a camera does
+/// not see its own housing.
+class BodyImage {
+ public:
+  BodyImage(const Capsules& body, const Pose& base_T_eye, const Eigen::Vector3d& also_outside_m);
+
+  [[nodiscard]] bool empty() const { return parts_.empty(); }
+  /// True when a row at normalised height y can meet a capsule at all.
+  [[nodiscard]] bool in_row(double y) const;
+  /// The nearest capsule surface along (x, y, 1) that is nearer than `before_m`; false when there is none.
+  [[nodiscard]] bool intersect(double x, double y, double before_m, BodyHit& hit) const;
+
+ private:
+  struct Part {
+    Eigen::Vector3d a, axis;  ///< one end and the unit direction to the other
+    double length_m = 0, radius_m = 0;
+    double x_low = 0, x_high = 0, y_low = 0, y_high = 0;  ///< outline in normalised image coordinates
+  };
+  std::vector<Part> parts_;
+};
+
+}  // namespace firstlook::sim

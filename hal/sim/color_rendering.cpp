@@ -1,0 +1,249 @@
+#include "hal/sim/color_rendering.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "hal/sim/body_image.hpp"
+#include "hal/sim/pixel_noise.hpp"
+
+namespace firstlook::sim {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr float kWhite = 0.85F, kBlack = 0.06F;  // printed paper
+constexpr double kGrayOfFullLight = 255;
+constexpr float kBlurSigma_px = 0.6F;   // of lens and sensor together, a webcam in focus
+constexpr float kNoiseSigma = 2.0F;     // grey levels
+constexpr float kBodyReflectance = 0.55F;
+constexpr std::uint64_t kGrayNoise = 2, kSampleJitter = 3;
+constexpr int kBoardSamples = 8;   // in each direction, where a pixel sees nothing but the board: by formula
+constexpr int kTracedSamples = 4;  // in each direction, at other edges: rays
+
+// What a pixel sees; edges are where neighbours see different things.
+constexpr std::int32_t kNothing = -1, kBody = -2;
+constexpr std::int32_t kFaces = 8;  // for each solid: 0..5 its sides by normal, 6 and 7 the light and dark of the board
+constexpr std::int32_t kLight = 6, kDark = 7;
+
+struct Sample {
+  float gray = 0;
+  std::int32_t seen = kNothing;
+};
+
+class ColorFrame {
+ public:
+  ColorFrame(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
+             const Transform<Base, Camera>& base_T_camera, const Exposure& exposure)
+      : scene_(scene),
+        tracer_(tracer),
+        rays_(rays),
+        base_T_camera_(base_T_camera.pose()),
+        board_T_camera_((scene.board.base_T_board.inverse() * base_T_camera).pose()),
+        board_normal_(-scene.board.base_T_board.rotation().col(2)),
+        body_(exposure.body, base_T_camera_, base_T_camera.translation()),
+        noise_(exposure.seed, exposure.frame, kGrayNoise),
+        jitter_(exposure.seed, exposure.frame, kSampleJitter),
+        gray_(rays.x.size()),
+        seen_(rays.x.size()) {}
+
+  void render(MutableGrayImage out) {
+    trace_centers();
+    resample_edges();
+    blur();
+    for (std::size_t i = 0; i < gray_.size(); ++i) {
+      const float noisy = gray_[i] + kNoiseSigma * normal_of(noise_.bits(i));
+      out.data[i] = static_cast<std::uint8_t>(std::clamp(std::floor(noisy + 0.5F), 0.0F, 255.0F));
+    }
+  }
+
+ private:
+  void aim(RayRow& row, std::size_t i, double x, double y) const {
+    const Vector3d d = base_T_camera_.linear() * Vector3d(x, y, 1);
+    row.x[i] = static_cast<float>(d.x()), row.y[i] = static_cast<float>(d.y()), row.z[i] = static_cast<float>(d.z());
+  }
+
+  void trace_centers() {
+    const auto width = static_cast<std::size_t>(rays_.camera.width);
+    RayRow row(width);
+    for (int r = 0; r < rays_.camera.height; ++r) {
+      const std::size_t first = rays_.index(0, r);
+      for (std::size_t i = 0; i < width; ++i) aim(row, i, rays_.x[first + i], rays_.y[first + i]);
+      tracer_.trace(base_T_camera_.translation(), row, width);
+      for (std::size_t i = 0; i < width; ++i) {
+        const Sample sample = look(row, i, rays_.x[first + i], rays_.y[first + i]);
+        gray_[first + i] = sample.gray;
+        seen_[first + i] = sample.seen;
+      }
+    }
+  }
+
+  /// Where the ray (x, y, 1) meets the board's plane, in board coordinates.
+  [[nodiscard]] Vector3d on_board(double x, double y) const {
+    const Vector3d d = board_T_camera_.linear() * Vector3d(x, y, 1);
+    return board_T_camera_.translation() - board_T_camera_.translation().z() / d.z() * d;
+  }
+
+  [[nodiscard]] Sample look_at_board(double x, double y) const {
+    const Vector3d at = on_board(x, y);
+    const float reflectance = board_reflectance(scene_.board, at.x(), at.y());
+    const Vector3d point = scene_.board.base_T_board * at;
+    return {brightness(reflectance, point, board_normal_),
+            static_cast<std::int32_t>(scene_.board_solid) * kFaces + (reflectance == kBlack ? kDark : kLight)};
+  }
+
+  [[nodiscard]] float brightness(double reflectance, const Vector3d& point, const Vector3d& normal) const {
+    return static_cast<float>(kGrayOfFullLight * shade(scene_.light, reflectance, point, normal));
+  }
+
+  /// What ray i of the row, which is (x, y, 1) of the camera, has met.
+  [[nodiscard]] Sample look(const RayRow& row, std::size_t i, double x, double y) const {
+    BodyHit hit;
+    if (!body_.empty() && body_.intersect(x, y, row.t[i], hit)) {
+      const Vector3d point = base_T_camera_ * Vector3d(hit.depth_m * Vector3d(x, y, 1));
+      return {brightness(kBodyReflectance, point, base_T_camera_.linear() * hit.normal), kBody};
+    }
+    if (row.solid[i] < 0) return {};
+    const auto solid = static_cast<std::size_t>(row.solid[i]);
+    const Vector3d normal(row.nx[i], row.ny[i], row.nz[i]);
+    if (solid == scene_.board_solid && normal.dot(board_normal_) > 0.999) return look_at_board(x, y);
+    const Vector3d point =
+        base_T_camera_.translation() + static_cast<double>(row.t[i]) * Vector3d(row.x[i], row.y[i], row.z[i]);
+    int axis = 0;
+    normal.cwiseAbs().maxCoeff(&axis);
+    return {brightness(scene_.solids[solid].surface.gray(), point, normal),
+            row.solid[i] * kFaces + 2 * axis + (normal[axis] > 0 ? 1 : 0)};
+  }
+
+  [[nodiscard]] bool is_board(std::int32_t seen) const {
+    return seen >= 0 && static_cast<std::size_t>(seen / kFaces) == scene_.board_solid && seen % kFaces >= kLight;
+  }
+
+  enum class Around { kUniform, kBoard, kEdge };
+
+  [[nodiscard]] Around around(int c, int r) const {
+    const std::int32_t own = seen_[rays_.index(c, r)];
+    bool uniform = true, board = is_board(own);
+    for (int dr = r > 0 ? -1 : 0; dr <= (r + 1 < rays_.camera.height ? 1 : 0); ++dr) {
+      for (int dc = c > 0 ? -1 : 0; dc <= (c + 1 < rays_.camera.width ? 1 : 0); ++dc) {
+        const std::int32_t other = seen_[rays_.index(c + dc, r + dr)];
+        uniform = uniform && other == own;
+        board = board && is_board(other);
+      }
+    }
+    return uniform ? Around::kUniform : board ? Around::kBoard : Around::kEdge;
+  }
+
+  void resample_edges() {
+    std::vector<float> resampled = gray_;
+    RayRow row(kTracedSamples * kTracedSamples);
+    for (int r = 0; r < rays_.camera.height; ++r) {
+      for (int c = 0; c < rays_.camera.width; ++c) {
+        const Around what = around(c, r);
+        if (what == Around::kBoard) resampled[rays_.index(c, r)] = integrate_board(c, r);
+        if (what == Around::kEdge) resampled[rays_.index(c, r)] = integrate_traced(c, r, row);
+      }
+    }
+    gray_ = std::move(resampled);
+  }
+
+  /// Normalised image points that are spread evenly over a pixel: one at random in each of n x n cells.
+  template <typename Visit>
+  void spread(int c, int r, int n, Visit visit) const {
+    const int c0 = std::max(c - 1, 0), c1 = std::min(c + 1, rays_.camera.width - 1);
+    const int r0 = std::max(r - 1, 0), r1 = std::min(r + 1, rays_.camera.height - 1);
+    const std::size_t left = rays_.index(c0, r), right = rays_.index(c1, r);
+    const std::size_t above = rays_.index(c, r0), below = rays_.index(c, r1);
+    const double dxc = (rays_.x[right] - rays_.x[left]) / (c1 - c0), dyc = (rays_.y[right] - rays_.y[left]) / (c1 - c0);
+    const double dxr = (rays_.x[below] - rays_.x[above]) / (r1 - r0), dyr = (rays_.y[below] - rays_.y[above]) / (r1 - r0);
+    const std::size_t pixel = rays_.index(c, r);
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        const std::uint64_t bits = jitter_.bits(pixel * 64 + static_cast<std::size_t>(j * n + i));
+        const double dc = (i + uniform_of(bits, 0)) / n - 0.5, dr = (j + uniform_of(bits, 1)) / n - 0.5;
+        visit(rays_.x[pixel] + dc * dxc + dr * dxr, rays_.y[pixel] + dc * dyc + dr * dyr);
+      }
+    }
+  }
+
+  [[nodiscard]] float integrate_board(int c, int r) const {
+    float sum = 0;
+    spread(c, r, kBoardSamples, [&](double x, double y) { sum += look_at_board(x, y).gray; });
+    return sum / (kBoardSamples * kBoardSamples);
+  }
+
+  [[nodiscard]] float integrate_traced(int c, int r, RayRow& row) const {
+    std::array<std::array<double, 2>, kTracedSamples * kTracedSamples> at;
+    std::size_t count = 0;
+    spread(c, r, kTracedSamples, [&](double x, double y) {
+      at[count] = {x, y};
+      aim(row, count++, x, y);
+    });
+    tracer_.trace(base_T_camera_.translation(), row, count);
+    float sum = 0;
+    for (std::size_t i = 0; i < count; ++i) sum += look(row, i, at[i][0], at[i][1]).gray;
+    return sum / static_cast<float>(count);
+  }
+
+  /// A Gaussian of five taps, first along rows, then along columns.
+  void blur() {
+    std::array<float, 5> taps{};
+    float total = 0;
+    for (int k = -2; k <= 2; ++k) {
+      const auto d = static_cast<float>(k);
+      total += taps[static_cast<std::size_t>(k + 2)] = std::exp(-0.5F * d * d / (kBlurSigma_px * kBlurSigma_px));
+    }
+    for (float& tap : taps) tap /= total;
+    std::vector<float> across(gray_.size());
+    pass(taps, 1, 0, gray_, across);
+    pass(taps, 0, 1, across, gray_);
+  }
+
+  void pass(const std::array<float, 5>& taps, int dc, int dr, const std::vector<float>& from,
+            std::vector<float>& to) const {
+    const int width = rays_.camera.width, height = rays_.camera.height;
+    for (int r = 0; r < height; ++r) {
+      for (int c = 0; c < width; ++c) {
+        float sum = 0;
+        for (int k = -2; k <= 2; ++k) {
+          const int cc = std::clamp(c + k * dc, 0, width - 1), rr = std::clamp(r + k * dr, 0, height - 1);
+          sum += taps[static_cast<std::size_t>(k + 2)] * from[rays_.index(cc, rr)];
+        }
+        to[rays_.index(c, r)] = sum;
+      }
+    }
+  }
+
+  const Scene& scene_;
+  const RayTracer& tracer_;
+  const PixelRays& rays_;
+  const Pose base_T_camera_, board_T_camera_;
+  const Vector3d board_normal_;  ///< towards who looks at it
+  const BodyImage body_;
+  const PixelNoise noise_, jitter_;
+  std::vector<float> gray_;
+  std::vector<std::int32_t> seen_;
+};
+
+}  // namespace
+
+float board_reflectance(const BoardPlacement& board, double x_m, double y_m) {
+  const int column = static_cast<int>(std::floor(x_m / board.spec.square_size_m));
+  const int row = static_cast<int>(std::floor(y_m / board.spec.square_size_m));
+  const bool on_pattern =
+      column >= -1 && row >= -1 && column < board.spec.inner_columns && row < board.spec.inner_rows;
+  return on_pattern && (column + row) % 2 == 0 ? kBlack : kWhite;
+}
+
+double shade(const Light& light, double reflectance, const Vector3d& point_m, const Vector3d& normal) {
+  const double falling = light.ambient + light.directed * std::max(0.0, normal.dot(light.toward.normalized()));
+  return reflectance * falling * std::max(0.0, 1 + light.gradient_per_m.dot(point_m));
+}
+
+void render_color_image(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
+                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out) {
+  ColorFrame(scene, tracer, rays, base_T_camera, exposure).render(out);
+}
+
+}  // namespace firstlook::sim

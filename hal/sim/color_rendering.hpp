@@ -1,0 +1,21 @@
+/// Colour camera images, as grey values.
+#pragma once
+
+#include "hal/sim/pixel_rays.hpp"
+#include "hal/sim/ray_tracer.hpp"
+#include "hal/sim/renderer.hpp"
+
+namespace firstlook::sim {
+
+/// Reflectance of a board's front at a point of its plane, in board coordinates: dark and light squares, white around them.
+[[nodiscard]] float board_reflectance(const BoardPlacement& board, double x_m, double y_m);
+
+/// Brightness of a diffuse surface: reflectance, times the light at a point with this unit normal.
+[[nodiscard]] double shade(const Light& light, double reflectance, const Eigen::Vector3d& point_m,
+                           const Eigen::Vector3d& normal);
+
+/// Fills `out`, which has the size of `rays.camera`: antialiased, blurred as by the lens, with noise, 8 bits.
+void render_color_image(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
+                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out);
+
+}  // namespace firstlook::sim

@@ -1,0 +1,68 @@
+/// Follows the true, unpadded body through the true scene: contacts, and entries into space not known to be free.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/kinematics/arm_model.hpp"
+#include "algorithms/mapping/safe_zone.hpp"
+#include "algorithms/motion/body.hpp"
+#include "hal/sim/grader.hpp"
+#include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/true_world.hpp"
+
+namespace firstlook::sim {
+
+inline constexpr double kBodyStep_m = 0.002;          ///< no body point moves farther between two checks
+inline constexpr double kOverlapTolerance_m = 1e-6;   ///< less than this is rounding, not an entry
+
+/// The camera's housing as it is: a Kinect is 0.28 m wide along x of the colour camera and 0.07 m deep.
+[[nodiscard]] Capsule true_housing(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera);
+
+/// The arm's true geometry and the camera's, in link frames.
+[[nodiscard]] Capsules true_capsules(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera,
+                                     bool camera_on_arm = true);
+
+class ContactMonitor final : public BodyWatcher {
+ public:
+  /// Links 0 and 1 are exempt while they stay inside the allowance, as for planner and guardian. The world must outlive it.
+  ContactMonitor(const ArmModel& arm, const Capsules& body, const BaseAllowance& allowance, const SafeZone& zone,
+                 const TrueWorld& world);
+
+  /// The scene has changed: from now on this is the world.
+  void set_world(const TrueWorld& world);
+  /// See Grader::watch. Allocates.
+  void watch(const KnownFreeView* view);
+  bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) override;
+
+  [[nodiscard]] std::uint64_t contacts() const { return contacts_; }
+  [[nodiscard]] std::uint64_t unknown_entries() const { return unknown_entries_; }
+  [[nodiscard]] std::uint64_t checks() const { return checks_; }
+
+ private:
+  void check(const Capsules& placed);
+  void check_contact(const Capsules& placed);
+  void check_zone(const Capsules& placed);
+  void check_voxels(const Capsules& placed);
+  /// One voxel that the body overlaps now.
+  void occupy(const Eigen::Vector3i& voxel, bool& outside_grid);
+  [[nodiscard]] bool exempt(const Capsule& placed) const;
+
+  const ArmModel arm_;
+  const Capsules body_;
+  const BaseAllowance allowance_;
+  const SafeZone zone_;
+  const TrueWorld* world_;
+  const KnownFreeView* view_ = nullptr;
+
+  Capsules last_;                          ///< where the body was at the last check; empty before the first
+  std::vector<std::uint32_t> overlapped_;  ///< for each voxel the number of the last check in which the body overlapped it
+  std::uint32_t check_number_ = 1;
+  bool in_contact_ = false;
+  bool outside_ = false;                   ///< of the zone, or of the grid
+  std::uint64_t contacts_ = 0;
+  std::uint64_t unknown_entries_ = 0;
+  std::uint64_t checks_ = 0;
+};
+
+}  // namespace firstlook::sim

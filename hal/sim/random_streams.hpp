@@ -1,0 +1,14 @@
+/// Stream numbers of the random draws around arm, devices and grading, so that no use shifts another's.
+#pragma once
+
+#include <cstdint>
+
+namespace firstlook::sim {
+
+inline constexpr std::uint64_t kDeviationStream = 5101;
+inline constexpr std::uint64_t kEncoderStream = 5102;
+inline constexpr std::uint64_t kColorDropStream = 5103;
+inline constexpr std::uint64_t kDepthDropStream = 5104;
+inline constexpr std::uint64_t kObservableStream = 5105;
+
+}  // namespace firstlook::sim

@@ -1,0 +1,74 @@
+/// The simulated cell: all devices of a cart in a scene, and apart from them the grader, who knows the truth.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "algorithms/mapping/safe_zone.hpp"
+#include "hal/api/cameras.hpp"
+#include "hal/api/operator_devices.hpp"
+#include "hal/api/robot_arm.hpp"
+#include "hal/sim/grader.hpp"
+#include "platform/core/camera_intrinsics.hpp"
+#include "platform/core/joint_vector.hpp"
+#include "platform/core/result.hpp"
+#include "platform/core/transform.hpp"
+
+namespace firstlook::sim {
+
+struct SimulationOptions {
+  std::string cell = "workshop";  ///< built-in name, "random:SEED", or a file
+  std::uint64_t seed = 1;         ///< of noise, deviations, faults and the true mount
+  bool fast_sensor = false;       ///< coarser depth, corners instead of pixels
+  std::string faults;             ///< faults.hpp
+  int workers = 2;                ///< threads of the observable set; results do not depend on it
+};
+
+/// A region of space in base coordinates that nothing may enter, as the configuration has it.
+struct KeepOut {
+  Eigen::Vector3d low_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d high_m = Eigen::Vector3d::Zero();
+};
+
+/// What an integrator would have typed in for this cell: nothing that the job has to find out.
+struct CellDescription {
+  std::string name;
+  std::string arm_model;
+  JointVector start_rad;         ///< where the arm stands before the job
+  CameraIntrinsics color;        ///< of the factory sheet
+  CameraIntrinsics depth;
+  double depth_units_per_m = 1000;
+  double depth_range_min_m = 0.5;
+  double depth_range_max_m = 5.0;
+  double depth_range_trusted_m = 3.0;
+  double depth_noise_at_1m = 0.00285;      ///< sigma at 1 m; grows with z²
+  Transform<Camera, Depth> camera_T_depth;  ///< factory transform
+  int board_columns = 9;         ///< inner corners
+  int board_rows = 6;
+  double board_square_m = 0.03;
+  double cart_top_m = -0.02;     ///< z of the cart's own top
+  SafeZone safe_zone;
+  std::vector<KeepOut> keep_out;
+};
+
+/// Owns scene, devices and grader. Devices may be used as hal/api says; their references live as long as the cell.
+class SimulatedCell {
+ public:
+  virtual ~SimulatedCell() = default;
+  [[nodiscard]] virtual const CellDescription& description() const = 0;
+  [[nodiscard]] virtual hal::RobotArm& arm() = 0;
+  [[nodiscard]] virtual hal::ColorCamera& color() = 0;
+  [[nodiscard]] virtual hal::DepthCamera& depth() = 0;
+  [[nodiscard]] virtual hal::Pendant& pendant() = 0;
+  [[nodiscard]] virtual hal::Panel& panel() = 0;
+  /// For main and the grading of a finished run only; never for anything that decides.
+  [[nodiscard]] virtual Grader& grader() = 0;
+};
+
+/// Builds a cell from its options. Errors: kCellInvalid for a cell that cannot be used, kUsage for a fault specification
+/// that is not understood, kDataMissing for a file that cannot be opened.
+[[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options);
+
+}  // namespace firstlook::sim

@@ -1,0 +1,67 @@
+/// The grader of a simulated cell.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/sim/contacts.hpp"
+#include "hal/sim/grader.hpp"
+#include "hal/sim/true_world.hpp"
+#include "platform/loop/worker_pool.hpp"
+
+namespace firstlook::sim {
+
+/// A part of the cell that reports ask for by name: a box in base coordinates.
+struct NamedRegion {
+  std::string name;
+  Eigen::Vector3d low_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d high_m = Eigen::Vector3d::Zero();
+};
+
+/// The truth that a grader knows. The world must outlive it.
+struct Truth {
+  ArmModel arm;
+  const TrueWorld* world = nullptr;
+  Transform<Flange, Camera> flange_T_camera;
+  Transform<Camera, Depth> camera_T_depth;
+  CameraIntrinsics depth;
+  bool camera_on_arm = true;
+  FreeSpace space;  ///< safe zone and keep-outs as configured
+  JointVector start_rad;
+  std::vector<NamedRegion> regions;
+  std::uint64_t seed = 1;
+  int workers = 2;
+};
+
+class TruthGrader final : public Grader {
+ public:
+  explicit TruthGrader(const Truth& truth);
+
+  [[nodiscard]] ContactMonitor& monitor() { return monitor_; }
+
+  void watch(const KnownFreeView* view) override;
+  [[nodiscard]] std::uint64_t contacts() const override { return monitor_.contacts(); }
+  [[nodiscard]] std::uint64_t unknown_entries() const override { return monitor_.unknown_entries(); }
+  [[nodiscard]] TruthFigures grade(const FinalClaims& claims) override;
+  [[nodiscard]] std::vector<RegionFigure> regions(const FinalClaims& claims) override;
+  [[nodiscard]] Transform<Flange, Camera> true_flange_T_camera() const override { return truth_.flange_T_camera; }
+
+ private:
+  /// Computed once for each geometry and set of options.
+  const ObservableSet& observable(const GridGeometry& geometry, const ObservableOptions& options);
+  void grade_hand_eye(const FinalClaims& claims, TruthFigures& figures) const;
+  void grade_map(const FinalClaims& claims, TruthFigures& figures);
+
+  Truth truth_;
+  ContactMonitor monitor_;
+  WorkerPool workers_;
+  struct Known {
+    GridGeometry geometry;
+    ObservableOptions options;
+    ObservableSet set;
+  };
+  std::optional<Known> known_;
+};
+
+}  // namespace firstlook::sim

@@ -1,0 +1,31 @@
+/// A scripted colour camera: pictures of one grey value, or corners, as the test says.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+
+#include "tests/support/mock_stream.hpp"
+
+namespace firstlook::mock {
+
+class MockColorCamera final : public MockStream<hal::ColorCamera> {
+ public:
+  explicit MockColorCamera(const CameraIntrinsics& intrinsics = {64, 48, 60, 60, 31.5, 23.5}, Duration period = milliseconds(66))
+      : MockStream(intrinsics, period) {}
+
+  std::uint8_t gray = 128;                                              ///< of every pixel
+  std::function<std::optional<hal::CornerObservation>(const hal::Frame&)> corners;  ///< none: pixels only
+
+  [[nodiscard]] Status read(const hal::Frame& frame, MutableGrayImage image) override {
+    if (!holds(frame)) return failure(Fault::kFrameGone, "colour frame {}", frame.sequence);
+    if (!fits(image)) return failure(Fault::kFrameRefused, "wrong size");
+    std::ranges::fill(image.pixels(), gray);
+    return {};
+  }
+  [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame) override {
+    if (!corners || !holds(frame)) return std::nullopt;
+    return corners(frame);
+  }
+};
+
+}  // namespace firstlook::mock

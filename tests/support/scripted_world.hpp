@@ -1,0 +1,253 @@
+/// A world for the state machine without devices, map or solver: it carries out decisions in the simplest way and
+/// answers each job with what the script says.
+#pragma once
+
+#include <algorithm>
+#include <deque>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "app/machine/machine.hpp"
+
+namespace firstlook::test {
+
+class ScriptedWorld : public DecisionSink {
+ public:
+  explicit ScriptedWorld(MachineSettings settings = default_settings()) : machine(settings, *this) {}
+
+  static MachineSettings default_settings() {
+    MachineSettings s;
+    s.parking_rad = JointVector{0, -1.5, 1.5, 0, 0, 0};
+    s.calibration_views_min = 2;
+    s.calibration_views_max = 4;
+    s.explore_views_max = 3;
+    return s;
+  }
+
+  // ---- the script; change before run_until
+  std::function<DetectResult(const DetectArguments&)> detect = [](const DetectArguments& a) {
+    DetectResult r;
+    r.found = true;
+    r.changed = a.purpose == BoardLook::kIdentify;
+    return r;
+  };
+  std::function<PlanResult(const PlanArguments&)> plan = [](const PlanArguments& a) {
+    PlanResult r;
+    r.found = true;
+    r.path.push_back({a.to_rad, 0.5, 1.0});
+    return r;
+  };
+  std::function<NextViewResult(const FromHere&)> next_view = [](const FromHere& a) {
+    NextViewResult r;
+    r.found = a.step % 3 != 2;
+    JointVector to = a.at_rad;
+    to[0] += 0.05;
+    r.path.push_back({to, 0.5, 1.0});
+    return r;
+  };
+  SolveResult solve = [] {
+    SolveResult r;
+    r.solved = true;
+    return r;
+  }();
+  ValidateResult validate{.accepted = true};
+  IntegrateResult integrated{.used = true, .path_free = true};
+  CheckBoardResult check{.seen = true, .moved = false};
+  int locate_views = 4;
+  bool devices = true;
+  bool consent = true;
+  bool arm_reports = true;
+  bool depth_frames = true;
+  hal::ArmSafety safety = hal::ArmSafety::kNormal;
+  double guardian_margin_m = 0.1;
+
+  // ---- what happened
+  Machine machine;
+  std::vector<StateId> visited;
+  std::vector<std::string> shown;
+  std::vector<Fault> stops;
+  std::vector<hal::Segment> segments;
+  std::size_t segments_after_stop = 0;
+  int forgotten = 0;
+  bool ended = false;
+  Ending ending;
+  Instant now{};
+
+  void press(hal::OperatorAction action, OperatorDevice device = OperatorDevice::kPendant) {
+    machine.on_event(now, OperatorActed{device, action});
+  }
+  /// Steps of 8 ms until the state is entered, the job ends, or the time is over. Returns whether the state was reached.
+  bool run_until(StateId state, double limit_s = 600) {
+    if (visited.empty()) machine.start(now);
+    const Instant end = now + seconds(limit_s);
+    while (now < end && !ended && machine.state() != state) tick();
+    return machine.state() == state;
+  }
+  bool run_to_end(double limit_s = 4000) {
+    const Instant end = now + seconds(limit_s);
+    if (visited.empty()) machine.start(now);
+    while (now < end && !ended) tick();
+    return ended;
+  }
+  [[nodiscard]] bool was_in(StateId state) const {
+    return std::find(visited.begin(), visited.end(), state) != visited.end();
+  }
+  void tick() {
+    now = now + milliseconds(8);
+    if (!devices) {
+      fire_timers();
+      return;
+    }
+    move_on();
+    if (arm_reports) machine.on_event(now, report());
+    if (++ticks_ % 8 == 0) machine.on_event(now, ColorFrameArrived{{now - milliseconds(4), ++frames_, frames_ % 32}});
+    if (ticks_ % 4 == 0 && depth_frames) {
+      machine.on_event(now, DepthFrameArrived{{now - milliseconds(4), ++frames_, frames_ % 32}});
+    }
+    answer_jobs();
+    fire_timers();
+  }
+
+  // ---- DecisionSink
+  void state_entered(Instant, StateId state) override { visited.push_back(state); }
+  void move_arm(Instant, const hal::Segment& segment) override {
+    if (!stops.empty()) ++segments_after_stop;
+    segments.push_back(segment);
+    if (!consent) {
+      machine_refusal_ = true;
+      return;
+    }
+    target_ = segment.target_rad;
+    start_ = position_;
+    segment_ = segment.number;
+    fraction_ = 0;
+  }
+  void stop_arm(Instant) override { fraction_ = 1; }
+  void start_job(Instant, JobKind kind, std::uint32_t number, std::span<const std::byte> arguments) override {
+    jobs_.push_back({kind, number, {arguments.begin(), arguments.end()}});
+  }
+  void set_timer(Instant, MachineTimer timer, Instant due) override { timers_[timer] = due; }
+  void cancel_timer(Instant, MachineTimer timer) override { timers_.erase(timer); }
+  void show(Instant, std::string_view line) override { shown.emplace_back(line); }
+  void light(Instant, hal::Light) override {}
+  void forget_known_free(Instant) override { ++forgotten; }
+  void stop_recorded(Instant, Fault cause) override { stops.push_back(cause); }
+  void finished(Instant, const Ending& how) override {
+    ended = true;
+    ending = how;
+  }
+
+ private:
+  struct Job {
+    JobKind kind;
+    std::uint32_t number;
+    std::vector<std::byte> arguments;
+  };
+
+  void move_on() {
+    if (fraction_ < 1) {
+      fraction_ = std::min(1.0, fraction_ + 0.1);
+      position_ = interpolate(start_, target_, fraction_);
+    }
+  }
+  ArmReported report() const {
+    ArmReported r;
+    r.state.stamp = now;
+    r.state.position_rad = position_;
+    r.state.velocity_rad_s = JointVector::zero(6);
+    r.state.safety = safety;
+    r.state.program_running = consent;
+    r.state.moving = fraction_ < 1;
+    r.state.segment = segment_;
+    r.guardian_margin_m = guardian_margin_m;
+    return r;
+  }
+  template <typename T>
+  static T arguments_of(const Job& job) {
+    T value;
+    ENSURE(9001, unpack(std::span<const std::byte>(job.arguments), value));
+    return value;
+  }
+  template <typename T>
+  void answer(const Job& job, const T& result) {
+    std::vector<std::byte> bytes(16384);
+    const std::size_t size = pack(result, std::span<std::byte>(bytes));
+    machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size)});
+  }
+  ViewList views_around(const JointVector& at, int count) const {
+    ViewList list;
+    for (int i = 0; i < count; ++i) {
+      JointVector q = at;
+      q[5 - i % 6] += 0.1;
+      list.views_rad.push_back(q);
+    }
+    return list;
+  }
+  void answer_jobs() {
+    while (!jobs_.empty() && !ended) {
+      const Job job = jobs_.front();
+      jobs_.pop_front();
+      switch (job.kind) {
+        case JobKind::kLocateViews: answer(job, views_around(position_, locate_views)); break;
+        case JobKind::kIdentifyMotions: answer(job, views_around(position_, 6)); break;
+        case JobKind::kPlan: answer(job, plan(arguments_of<PlanArguments>(job))); break;
+        case JobKind::kCertifyPath: {
+          PlanResult r;
+          r.found = true;
+          answer(job, r);
+          break;
+        }
+        case JobKind::kDetectBoard: answer(job, detect(arguments_of<DetectArguments>(job))); break;
+        case JobKind::kNextCalibrationView: {
+          CalibrationViewResult r;
+          r.found = true;
+          JointVector to = position_;
+          to[4] += 0.05;
+          r.path.push_back({to, 0.5, 1.0});
+          answer(job, r);
+          break;
+        }
+        case JobKind::kSolve: answer(job, solve); break;
+        case JobKind::kValidate: answer(job, validate); break;
+        case JobKind::kIntegrate: {
+          IntegrateResult r = integrated;
+          r.at_view = arguments_of<IntegrateArguments>(job).at_view;
+          answer(job, r);
+          break;
+        }
+        case JobKind::kNextSweepView:
+        case JobKind::kNextView: answer(job, next_view(arguments_of<FromHere>(job))); break;
+        case JobKind::kCheckBoard: answer(job, check); break;
+        case JobKind::kSummarize: answer(job, SummarizeResult{}); break;
+      }
+    }
+  }
+  void fire_timers() {
+    std::vector<MachineTimer> due;
+    for (const auto& [timer, at] : timers_) {
+      if (at <= now) due.push_back(timer);
+    }
+    for (const MachineTimer timer : due) {
+      timers_.erase(timer);
+      machine.on_event(now, TimerFired{timer});
+    }
+    if (machine_refusal_) {
+      machine_refusal_ = false;
+      machine.on_event(now, CommandRefused{Fault::kProgramStopped});
+    }
+  }
+
+  std::deque<Job> jobs_;
+  std::map<MachineTimer, Instant> timers_;
+  JointVector position_{0, -1.5, 1.5, 0, 0, 0};
+  JointVector start_ = position_, target_ = position_;
+  double fraction_ = 1;
+  std::uint32_t segment_ = 0;
+  std::uint32_t frames_ = 0;
+  int ticks_ = 0;
+  bool machine_refusal_ = false;
+};
+
+}  // namespace firstlook::test

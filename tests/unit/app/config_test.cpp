@@ -1,0 +1,200 @@
+/// The configuration: what it accepts, what it refuses and how well it says so.
+#include "app/config/config.hpp"
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "app/cli/small_commands.hpp"
+#include "app/config/config_keys.hpp"
+#include "app/config/load_config.hpp"
+#include "app/config/nearest_name.hpp"
+
+using namespace firstlook;
+using Catch::Matchers::Contains;
+
+namespace {
+
+std::string refused(std::string_view yaml, Fault fault) {
+  const Result<Config> config = parse_config(yaml, "cart.yaml");
+  INFO(yaml);
+  REQUIRE_FALSE(config.has_value());
+  CHECK(config.error().fault == fault);
+  return std::string(config.error().detail());
+}
+
+/// A configuration that differs from the defaults in every key.
+Config all_changed() {
+  Config c;
+  c.cell = "cells/my cell \"A\": #1.yaml";
+  c.seed = 9007199254740992;
+  c.workers = 7;
+  c.start_source = "panel";
+  c.arm = {"ur10e", 0.1 + 0.2, 1.0 / 3.0, 2.5};
+  c.safe_zone = {0.7, 0.9};
+  c.cart = {-0.123456789012345};
+  c.base_allowance = {0.2, 0.1};
+  c.keep_out = {{{-1, -2, 0}, {1, -1.5, 2}}, {{0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}}};
+  c.camera_envelope_radius_m = 0.15;
+  c.parking_rad = JointVector{0, -1.5707963267948966, 1e-17, 0.5, -0.25, 3};
+  c.board = {"checkerboard", 7, 5, 0.0251};
+  c.calibration = {"tsai-lenz", 9, 31, 5, 0.3, 0.6, 0.5, 4, 0.2, 0.4, 0.5, 1.1, 1.2, 1.3, 1.4, 0.02, 0.5};
+  c.depth = {0.4, 6, 3.5, 0.003};
+  c.map = {0.02, {-1, -1, 0}, {1, 1, 1}, 60, "ignore"};
+  c.explore = {61, 401, 2001, 9, 3};
+  c.clearance = {0.001, 0.002, 0.03, 4};
+  c.memory = {512};
+  return c;
+}
+
+}  // namespace
+
+TEST_CASE("printed configuration reads back as the same configuration", "[config]") {
+  for (const Config& config : {Config{}, all_changed()}) {
+    const std::string text = print_config(config);
+    INFO(text);
+    const Result<Config> again = parse_config(text, "printed");
+    if (!again) FAIL(again.error().detail());
+    CHECK(*again == config);
+    CHECK(print_config(*again) == text);
+  }
+}
+
+TEST_CASE("the table of keys covers every field", "[config]") {
+  // all_changed() differs from the defaults wherever a choice exists; a field without a key would survive the round
+  // trip of the test above only if it kept its default.
+  Config defaults, changed = all_changed();
+  const auto keys_defaults = config_keys(defaults), keys_changed = config_keys(changed);
+  REQUIRE(keys_defaults.size() == keys_changed.size());
+  for (std::size_t i = 0; i < keys_defaults.size(); ++i) {
+    INFO(keys_defaults[i].path);
+    CHECK_FALSE(keys_defaults[i].meaning.empty());
+    if (keys_defaults[i].choices.size() == 1) continue;
+    const bool same = std::visit(
+        [](const auto* a, const auto* b) {
+          if constexpr (std::is_same_v<decltype(a), decltype(b)>) return *a == *b;
+          return false;
+        },
+        keys_defaults[i].field, keys_changed[i].field);
+    CHECK_FALSE(same);
+  }
+}
+
+TEST_CASE("an empty file gives the defaults", "[config]") {
+  for (const char* yaml : {"", "# only a comment\n", "arm:\nmap:\n"}) {
+    const Result<Config> config = parse_config(yaml, "cart.yaml");
+    REQUIRE(config);
+    CHECK(*config == Config{});
+  }
+}
+
+TEST_CASE("an unknown key is named with place and nearest key", "[config]") {
+  CHECK_THAT(refused("seed: 4\narm:\n  modle: ur5\n", Fault::kConfigUnknownKey),
+             Contains("cart.yaml:3:3") && Contains("arm.modle") && Contains("did you mean arm.model?"));
+  CHECK_THAT(refused("speed_max_m_s: 0.1\n", Fault::kConfigUnknownKey),
+             Contains("cart.yaml:1:1: speed_max_m_s") && Contains("did you mean arm.speed_max_m_s?"));
+  CHECK_THAT(refused("arms: {model: ur5}\n", Fault::kConfigUnknownKey), Contains("did you mean arm?"));
+  CHECK_THAT(refused("<<: {seed: 3}\n", Fault::kConfigUnknownKey), Contains("1:1"));
+}
+
+TEST_CASE("wrong types, ranges and values are refused with the place and the range", "[config]") {
+  CHECK_THAT(refused("arm: {speed_max_m_s: 7}", Fault::kConfigBadValue),
+             Contains("cart.yaml:1:22") && Contains("is 7; must be between 0.01 and 1"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: -0.1}", Fault::kConfigBadValue), Contains("between"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: nan}", Fault::kConfigBadValue), Contains("finite"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: .nan}", Fault::kConfigBadValue), Contains("finite"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: inf}", Fault::kConfigBadValue), Contains("finite"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: 0.2m}", Fault::kConfigBadValue), Contains("finite"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: \"0.2\"}", Fault::kConfigBadValue), Contains("finite"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: }", Fault::kConfigBadValue), Contains("one number"));
+  CHECK_THAT(refused("arm: {speed_max_m_s: [1]}", Fault::kConfigBadValue), Contains("one number"));
+  CHECK_THAT(refused("arm: 3", Fault::kConfigBadValue), Contains("arm must be a map"));
+  CHECK_THAT(refused("arm: {model: kuka}", Fault::kConfigBadValue), Contains("must be one of: ur3, ur5"));
+  CHECK_THAT(refused("workers: 2.5", Fault::kConfigBadValue), Contains("whole number"));
+  CHECK_THAT(refused("workers: 99999999999999999999", Fault::kConfigBadValue), Contains("whole number"));
+  CHECK_THAT(refused("map: {low_m: [0, 0]}", Fault::kConfigBadValue), Contains("three numbers"));
+  CHECK_THAT(refused("map: {low_m: [0, 0, nan]}", Fault::kConfigBadValue), Contains("finite"));
+  CHECK_THAT(refused("keep_out: [{low_m: [0, 0, 0]}]", Fault::kConfigBadValue), Contains("high_m"));
+  CHECK_THAT(refused("keep_out: [{low_m: [0,0,0], high_m: [1,1,1], x: 1}]", Fault::kConfigBadValue), Contains("else"));
+  CHECK_THAT(refused("parking_rad: [0, 9, 0, 0, 0, 0]", Fault::kConfigBadValue), Contains("between"));
+  CHECK_THAT(refused("- 1\n- 2\n", Fault::kConfigBadValue), Contains("map"));
+}
+
+TEST_CASE("a key given twice is refused", "[config]") {
+  CHECK_THAT(refused("seed: 1\nseed: 2\n", Fault::kConfigBadValue), Contains("cart.yaml:2:1") && Contains("twice"));
+  CHECK_THAT(refused("arm: {model: ur5}\narm: {model: ur3}\n", Fault::kConfigBadValue), Contains("twice"));
+}
+
+TEST_CASE("rules between keys hold", "[config]") {
+  CHECK_THAT(refused("map: {low_m: [2, -1, 0]}", Fault::kConfigBadValue), Contains("map.low_m"));
+  CHECK_THAT(refused("depth: {range_min_m: 3.5}", Fault::kConfigBadValue), Contains("range_trusted_m"));
+  CHECK_THAT(refused("depth: {range_max_m: 2}", Fault::kConfigBadValue), Contains("range_max_m"));
+  CHECK_THAT(refused("calibration: {views_min: 31}", Fault::kConfigBadValue), Contains("views_max"));
+  CHECK_THAT(refused("calibration: {views_min: 6}", Fault::kConfigBadValue), Contains("holdout_views"));
+  CHECK_THAT(refused("keep_out: [{low_m: [1,0,0], high_m: [0,1,1]}]", Fault::kConfigBadValue), Contains("keep_out"));
+}
+
+TEST_CASE("broken YAML is refused with its place, never thrown", "[config]") {
+  CHECK_THAT(refused("arm: {model: ur5\n", Fault::kConfigUnreadable), Contains("cart.yaml:"));
+  CHECK_THAT(refused("a: b: c", Fault::kConfigUnreadable), Contains("cart.yaml:1"));
+  CHECK_THAT(refused("seed: 1\n---\nseed: 2\n", Fault::kConfigUnreadable), Contains("more than one document"));
+  refused("? [1, 2]\n: 3\n", Fault::kConfigUnreadable);
+  refused("cell: \"never closed", Fault::kConfigUnreadable);
+}
+
+TEST_CASE("any prefix of a valid file is read or refused, never worse", "[config]") {
+  const std::string text = print_config(all_changed());
+  for (std::size_t size = 0; size < text.size(); size += 7) (void)parse_config(text.substr(0, size), "cut.yaml");
+}
+
+TEST_CASE("flag beats environment beats file beats default", "[config]") {
+  const auto file = std::filesystem::temp_directory_path() / "firstlook_config_test.yaml";
+  std::ofstream(file) << "seed: 10\nworkers: 3\narm: {speed_max_m_s: 0.2}\n";
+  ConfigSources sources;
+  sources.system_file = "/nowhere/firstlook.yaml";
+  CHECK(load_config(sources)->config == Config{});
+  CHECK(load_config(sources)->file.empty());
+
+  sources.file = file;
+  sources.environment = {"HOME=/root", "FIRSTLOOK_WORKERS=4", "FIRSTLOOK_SEED=20", "FIRSTLOOK_MAP_LOW_M=[-1, -1, 0]"};
+  sources.flags = {{"seed", "30", "--seed"}, {"cell", "a: b # c", "--cell"}};
+  const Result<LoadedConfig> loaded = load_config(sources);
+  REQUIRE(loaded);
+  CHECK(loaded->config.arm.speed_max_m_s == 0.2);
+  CHECK(loaded->config.workers == 4);
+  CHECK(loaded->config.seed == 30);
+  CHECK(loaded->config.cell == "a: b # c");
+  CHECK(loaded->config.map.low_m == std::array<double, 3>{-1, -1, 0});
+  CHECK(loaded->config.board == Config::Board{});
+  CHECK(loaded->file == file.string());
+
+  sources.environment = {"FIRSTLOOK_WORKER=4"};
+  CHECK_THAT(std::string(load_config(sources).error().detail()),
+             Contains("FIRSTLOOK_WORKER;") && Contains("FIRSTLOOK_WORKERS?"));
+  sources.environment = {"FIRSTLOOK_WORKERS"};
+  CHECK(load_config(sources).error().fault == Fault::kConfigBadValue);
+  sources.environment = {};
+  sources.flags = {{"seed", "-1", "--seed"}};
+  CHECK_THAT(std::string(load_config(sources).error().detail()), Contains("--seed: seed is -1; must be between 0"));
+  sources.flags = {};
+  sources.file = "/nowhere/at/all.yaml";
+  CHECK(load_config(sources).error().fault == Fault::kConfigUnreadable);
+  std::filesystem::remove(file);
+}
+
+TEST_CASE("the nearest name", "[config]") {
+  CHECK(edit_distance("", "abc") == 3);
+  CHECK(edit_distance("kitten", "sitting") == 3);
+  CHECK(edit_distance("modle", "model") == 1);
+  const std::string_view names[] = {"arm.model", "map.resolution_m"};
+  CHECK(nearest_name("resolution", names) == "map.resolution_m");
+  CHECK(nearest_name("arm.mode", names) == "arm.model");
+}
+
+TEST_CASE("the program's version is the build's", "[config]") {
+  const auto root = std::filesystem::path(__FILE__).parent_path() / ".." / ".." / "..";
+  std::ifstream file(root / "CMakeLists.txt");
+  const std::string cmake((std::istreambuf_iterator<char>(file)), {});
+  CHECK_THAT(cmake, Contains("project(firstlook VERSION " + version_text() + " "));
+}

@@ -1,0 +1,207 @@
+#include "app/machine/machine.hpp"
+
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "tests/support/scripted_world.hpp"
+
+namespace firstlook {
+using test::ScriptedWorld;
+using hal::OperatorAction;
+
+TEST_CASE("nothing moves before Play, and Play runs the whole job", "[machine]") {
+  ScriptedWorld world;
+  REQUIRE(world.run_until(StateId::kReady));
+  for (int i = 0; i < 2000; ++i) world.tick();
+  CHECK(world.segments.empty());
+  CHECK(world.machine.state() == StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+  for (const StateId state : {StateId::kLocateBoard, StateId::kIdentifyLink, StateId::kCollect, StateId::kSolve,
+                              StateId::kValidate, StateId::kSweep, StateId::kChoose, StateId::kPlan, StateId::kMove,
+                              StateId::kLook, StateId::kVerifyBoard, StateId::kPark, StateId::kReport}) {
+    INFO(state_row(state).name);
+    CHECK(world.was_in(state));
+  }
+}
+
+TEST_CASE("the panel's button starts only within a minute of Play", "[machine]") {
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.start_source = StartSource::kPanel;
+  ScriptedWorld world(settings);
+  REQUIRE(world.run_until(StateId::kReady));
+  world.press(OperatorAction::kPlay, OperatorDevice::kPanel);
+  CHECK_FALSE(world.run_until(StateId::kLocateBoard, 1));
+  world.press(OperatorAction::kPlay);
+  CHECK_FALSE(world.run_until(StateId::kLocateBoard, 61));
+  world.press(OperatorAction::kPlay, OperatorDevice::kPanel);
+  CHECK_FALSE(world.run_until(StateId::kLocateBoard, 1));
+  world.press(OperatorAction::kPlay);
+  world.press(OperatorAction::kPlay, OperatorDevice::kPanel);
+  CHECK(world.run_until(StateId::kLocateBoard, 1));
+}
+
+TEST_CASE("a missing device is named at boot", "[machine]") {
+  ScriptedWorld world;
+  world.devices = false;
+  REQUIRE(world.run_to_end(20));
+  CHECK(world.ending.outcome == Outcome::kFaulted);
+  CHECK(world.ending.fault == Fault::kDeviceMissing);
+}
+
+TEST_CASE("a board that is nowhere ends the job safely", "[machine]") {
+  ScriptedWorld world;
+  world.detect = [](const DetectArguments&) { return DetectResult{}; };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == Fault::kBoardNotLocated);
+}
+
+TEST_CASE("a camera that no joint moves is reported", "[machine]") {
+  ScriptedWorld world;
+  world.detect = [](const DetectArguments&) {
+    DetectResult r;
+    r.found = true;
+    return r;
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+  CHECK(world.ending.fault == Fault::kCameraNotOnArm);
+}
+
+TEST_CASE("a rejected calibration maps nothing", "[machine]") {
+  ScriptedWorld world;
+  world.validate.accepted = false;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+  CHECK_FALSE(world.was_in(StateId::kSweep));
+}
+
+TEST_CASE("a board that moved rejects the map", "[machine]") {
+  ScriptedWorld world;
+  world.check.moved = true;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.fault == Fault::kBoardMoved);
+}
+
+TEST_CASE("no consent, no motion: pause withdraws, resume asks for a new segment from where the arm is", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kMove));
+  for (int i = 0; i < 3; ++i) world.tick();
+  world.consent = false;
+  world.tick();
+  CHECK(world.machine.state() == StateId::kPaused);
+  const std::size_t before = world.segments.size();
+  for (int i = 0; i < 500; ++i) world.tick();
+  CHECK(world.segments.size() == before);
+  CHECK(world.forgotten == 0);
+  world.consent = true;
+  world.tick();
+  CHECK(world.machine.state() != StateId::kPaused);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+}
+
+TEST_CASE("a long pause makes the known free space unknown again", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kSweep));
+  world.consent = false;
+  for (int i = 0; i < 125 * 61; ++i) world.tick();
+  world.consent = true;
+  world.tick();
+  CHECK(world.forgotten == 1);
+}
+
+TEST_CASE("every stop ends motion at once and needs a person", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  const StateId state = GENERATE(StateId::kLocateBoard, StateId::kCollect, StateId::kSweep, StateId::kMove,
+                                 StateId::kVerifyBoard, StateId::kPark);
+  REQUIRE(world.run_until(state));
+  Fault expected = Fault::kInternal;
+  SECTION("Stop on the pendant") {
+    expected = Fault::kProgramStopped;
+    world.press(OperatorAction::kStop);
+  }
+  SECTION("protective stop") {
+    expected = Fault::kProtectiveStop;
+    world.safety = hal::ArmSafety::kProtectiveStop;
+    world.tick();
+  }
+  REQUIRE(world.ended);
+  CHECK(world.machine.state() == StateId::kStopped);
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == expected);
+  CHECK(world.forgotten == 1);
+  const std::size_t before = world.segments.size();
+  for (int i = 0; i < 1000; ++i) world.tick();
+  CHECK(world.segments.size() == before);
+  CHECK(world.segments_after_stop == 0);
+}
+
+TEST_CASE("a silent arm while moving is a lost link", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kMove));
+  world.tick();
+  world.arm_reports = false;
+  REQUIRE(world.run_to_end(1));
+  CHECK(world.ending.fault == Fault::kLinkLost);
+}
+
+TEST_CASE("a look at a camera that delivers nothing ends with a stale stream", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kSweep));
+  world.depth_frames = false;
+  REQUIRE(world.run_to_end(20));
+  CHECK(world.ending.fault == Fault::kStreamStale);
+}
+
+TEST_CASE("an obstacle that a frame shows on the way stops the arm and another way is chosen", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kMove));
+  world.guardian_margin_m = -0.01;
+  world.tick();
+  CHECK(world.machine.state() == StateId::kLook);
+  REQUIRE(world.stops.size() == 1);
+  CHECK(world.stops[0] == Fault::kGuardianStop);
+  world.guardian_margin_m = 0.1;
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+}
+
+TEST_CASE("the state table is sound", "[machine]") {
+  std::set<std::string_view> names;
+  for (const StateRow& row : state_table()) {
+    CHECK(names.insert(row.name).second);
+    CHECK(is_within(row.state, row.state));
+    for (const Transition& t : row.transitions) CHECK(t.to < StateId::kNone);
+  }
+  // Whatever runs can be paused and stopped.
+  for (const StateRow& row : state_table()) {
+    if (!is_within(row.state, StateId::kRunning)) continue;
+    CHECK(is_within(row.state, StateId::kRunning));
+  }
+  CHECK(state_diagram().find("Ready --> LocateBoard") != std::string::npos);
+}
+
+}  // namespace firstlook

@@ -1,0 +1,94 @@
+#include <bit>
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <sstream>
+#include <string>
+
+#include "algorithms/mapping/moveit_scene.hpp"
+#include "algorithms/mapping/ply_writer.hpp"
+#include "platform/core/random.hpp"
+
+namespace firstlook {
+namespace {
+
+template <typename Write>
+std::string collect(Write write) {
+  std::string text;
+  write([&](std::span<const std::byte> bytes) {
+    text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  return text;
+}
+
+VoxelMap random_map(double occupied_fraction, std::uint64_t seed) {
+  Random random(seed);
+  VoxelMap map(GridGeometry{0.05, {-4, -5, 0}, {9, 12, 7}});
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const double draw = random.uniform();
+    if (draw < occupied_fraction) map.set(i, VoxelClass::kOccupied, 0);
+    if (draw > 0.95) map.set(i, VoxelClass::kFree, 0);
+  }
+  return map;
+}
+
+}  // namespace
+
+TEST_CASE("the point cloud holds the occupied voxels' centres", "[mapping][export]") {
+  const VoxelMap map = random_map(0.2, 1);
+  const VoxelCounts counts = map.counts();
+  for (const bool with_free : {false, true}) {
+    const std::string text = collect([&](ByteSink sink) { write_ply(map, with_free, sink); });
+    const std::size_t points = counts.occupied + (with_free ? counts.free : 0);
+    CHECK(text.starts_with("ply\nformat binary_little_endian 1.0\n"));
+    CHECK(text.find("element vertex " + std::to_string(points) + "\n") != std::string::npos);
+    const std::size_t data = text.find("end_header\n") + 11;
+    REQUIRE(text.size() == data + 16 * points);
+    for (std::size_t i = 0; i < points; ++i) {
+      float xyz[3];
+      std::memcpy(xyz, text.data() + data + 16 * i, sizeof xyz);
+      const Eigen::Vector3d p(static_cast<double>(xyz[0]), static_cast<double>(xyz[1]), static_cast<double>(xyz[2]));
+      const auto voxel_class = static_cast<VoxelClass>(text[data + 16 * i + 15]);
+      REQUIRE(map.class_at(p) == voxel_class);
+      REQUIRE(voxel_class != VoxelClass::kUnknown);
+    }
+  }
+}
+
+TEST_CASE("merged boxes cover exactly the occupied voxels, each once", "[mapping][export]") {
+  for (const double fraction : {0.0, 0.3, 0.9}) {
+    const VoxelMap map = random_map(fraction, 2);
+    const std::vector<AxisBox> boxes = merge_occupied(map);
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      const Eigen::Vector3d c = map.geometry().center_m(map.geometry().voxel_at(i));
+      int covers = 0;
+      for (const AxisBox& box : boxes)
+        covers += (c.array() > box.low_m.array()).all() && (c.array() < box.high_m.array()).all();
+      REQUIRE(covers == (map.voxel_class(i) == VoxelClass::kOccupied ? 1 : 0));
+    }
+    CHECK(boxes.size() <= map.counts().occupied);
+  }
+}
+
+TEST_CASE("a solid block is one box", "[mapping][export]") {
+  VoxelMap map(GridGeometry{0.1, {0, 0, 0}, {6, 6, 6}});
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const Eigen::Vector3i v = map.geometry().voxel_at(i);
+    if (v.x() >= 1 && v.x() < 4 && v.y() >= 2 && v.y() < 6 && v.z() < 2) map.set(i, VoxelClass::kOccupied, 0);
+  }
+  const std::vector<AxisBox> boxes = merge_occupied(map);
+  REQUIRE(boxes.size() == 1);
+  CHECK(boxes[0].low_m.isApprox(Eigen::Vector3d(0.1, 0.2, 0.0)));
+  CHECK(boxes[0].high_m.isApprox(Eigen::Vector3d(0.4, 0.6, 0.2)));
+}
+
+TEST_CASE("the scene has MoveIt's shape", "[mapping][export]") {
+  const std::vector<AxisBox> boxes = {{{0, 0, 0}, {0.1, 0.2, 0.4}}, {{-1, 0, 0}, {-0.5, 1, 1}}};
+  const std::string text = collect([&](ByteSink sink) { write_moveit_scene(boxes, "cell", sink); });
+  CHECK(text ==
+        "cell\n* map\n0 0 0\n0 0 0 1\n2\n"
+        "box\n0.1 0.2 0.4\n0.05 0.1 0.2\n0 0 0 1\n0.6 0.6 0.6 1\n"
+        "box\n0.5 1 1\n-0.75 0.5 0.5\n0 0 0 1\n0.6 0.6 0.6 1\n"
+        "0\n.\n");
+}
+
+}  // namespace firstlook

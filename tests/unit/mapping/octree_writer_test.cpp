@@ -1,0 +1,141 @@
+#include "algorithms/mapping/octree_writer.hpp"
+
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include "octomap_oracle.hpp"
+#include "platform/core/random.hpp"
+
+namespace firstlook {
+namespace {
+
+template <typename Write>
+std::string collect(Write write) {
+  std::string text;
+  write([&](std::span<const std::byte> bytes) {
+    text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  return text;
+}
+
+// Blocks of one value (so that pruning happens) and single voxels of others, across the origin of the keys.
+VoxelMap blocky_map(Random& random) {
+  VoxelMap map(GridGeometry{0.05, {-21, -9, -5}, {37, 26, 19}});
+  std::vector<std::uint64_t> missed(VoxelMap::bit_words(map.geometry())), hit(missed.size());
+  for (int frame = 0; frame < 6; ++frame) {
+    std::fill(missed.begin(), missed.end(), 0);
+    std::fill(hit.begin(), hit.end(), 0);
+    for (int block = 0; block < 5; ++block) {
+      const Eigen::Vector3i low(random.below(24), random.below(14), random.below(8));
+      const int edge = 4 + random.below(9);
+      std::vector<std::uint64_t>& plane = random.below(2) == 0 ? missed : hit;
+      for (std::size_t i = 0; i < map.size(); ++i) {
+        const Eigen::Vector3i v = map.geometry().voxel_at(i) - low;
+        if (v.minCoeff() >= 0 && v.maxCoeff() < edge) plane[i / 64] |= 1ULL << (i % 64);
+      }
+    }
+    for (int i = 0; i < 200; ++i) {
+      const auto at = static_cast<std::size_t>(random.below(static_cast<int>(map.size())));
+      hit[at / 64] |= 1ULL << (at % 64);
+    }
+    map.apply(missed, hit, {}, frame);
+  }
+  return map;
+}
+
+std::unique_ptr<octomap::OcTree> read_bt(const std::string& text) {
+  auto tree = std::make_unique<octomap::OcTree>(0.05);
+  std::istringstream stream(text);
+  REQUIRE(tree->readBinary(stream));
+  return tree;
+}
+
+std::unique_ptr<octomap::OcTree> read_ot(const std::string& text) {
+  std::istringstream stream(text);
+  std::unique_ptr<octomap::AbstractOcTree> any(octomap::AbstractOcTree::read(stream));
+  auto* tree = dynamic_cast<octomap::OcTree*>(any.get());
+  REQUIRE(tree != nullptr);
+  (void)any.release();
+  return std::unique_ptr<octomap::OcTree>(tree);
+}
+
+// The tree that OctoMap itself builds from the same values.
+octomap::OcTree build_tree(const VoxelMap& map) {
+  octomap::OcTree tree(0.05);
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (map.log_odds(i) == kUnknownLogOdds) continue;
+    const Eigen::Vector3i v = map.geometry().voxel_at(i) + map.geometry().first + Eigen::Vector3i::Constant(32768);
+    tree.setNodeValue(octomap::OcTreeKey(static_cast<octomap::key_type>(v.x()), static_cast<octomap::key_type>(v.y()),
+                                         static_cast<octomap::key_type>(v.z())),
+                      static_cast<float>(map.log_odds(i) * kLogOddsUnit), true);
+  }
+  tree.updateInnerOccupancy();
+  return tree;
+}
+
+}  // namespace
+
+TEST_CASE("OctoMap reads our .bt back voxel for voxel, and writes the same bytes", "[mapping][octomap]") {
+  Random random(1);
+  for (int round = 0; round < 3; ++round) {
+    const VoxelMap map = blocky_map(random);
+    const std::string text = collect([&](ByteSink sink) { write_bt(map, kOctreeDepth, sink); });
+    const auto tree = read_bt(text);
+    require_equal(map, *tree);
+    octomap::OcTree built = build_tree(map);
+    built.toMaxLikelihood();
+    built.prune();
+    CHECK(tree->size() == built.size());
+    std::ostringstream theirs;
+    built.writeBinaryConst(theirs);
+    CHECK(theirs.str() == text);
+  }
+}
+
+TEST_CASE("OctoMap reads our .ot back with its log-odds, and writes the same bytes", "[mapping][octomap]") {
+  Random random(2);
+  const VoxelMap map = blocky_map(random);
+  const std::string text = collect([&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); });
+  const auto tree = read_ot(text);
+  require_equal(map, *tree);
+  CHECK(compare(map, *tree).log_odds_error_max < 1e-6);
+  octomap::OcTree built = build_tree(map);
+  built.prune();
+  std::ostringstream theirs;
+  built.write(theirs);
+  CHECK(theirs.str() == text);
+}
+
+TEST_CASE("a coarser tree has what OctoMap's inner nodes say", "[mapping][octomap]") {
+  Random random(3);
+  const VoxelMap map = blocky_map(random);
+  const octomap::OcTree full = build_tree(map);
+  for (const int depth : {15, 14, 12, 3, 1}) {
+    const auto ot = read_ot(collect([&](ByteSink sink) { write_ot(map, depth, sink); }));
+    const auto bt = read_bt(collect([&](ByteSink sink) { write_bt(map, depth, sink); }));
+    CHECK(ot->size() < full.size());
+    for (const auto* tree : {ot.get(), bt.get()})
+      for (auto leaf = tree->begin_leafs(); leaf != tree->end_leafs(); ++leaf)
+        REQUIRE(static_cast<int>(leaf.getDepth()) <= depth);
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      const Eigen::Vector3d c = map.geometry().center_m(map.geometry().voxel_at(i));
+      const auto* expected = full.search(c.x(), c.y(), c.z(), static_cast<unsigned>(depth));
+      const auto* full_node = ot->search(c.x(), c.y(), c.z());
+      const auto* binary_node = bt->search(c.x(), c.y(), c.z());
+      REQUIRE((expected != nullptr) == (full_node != nullptr));
+      REQUIRE((expected != nullptr) == (binary_node != nullptr));
+      if (expected == nullptr) continue;
+      REQUIRE(full_node->getLogOdds() == expected->getLogOdds());
+      REQUIRE(bt->isNodeOccupied(binary_node) == full.isNodeOccupied(expected));
+    }
+  }
+}
+
+TEST_CASE("a map that knows nothing is an empty tree", "[mapping][octomap]") {
+  const VoxelMap map(GridGeometry{0.05, {0, 0, 0}, {8, 8, 8}});
+  CHECK(read_bt(collect([&](ByteSink sink) { write_bt(map, kOctreeDepth, sink); }))->size() == 0);
+  CHECK(read_ot(collect([&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); }))->size() == 0);
+}
+
+}  // namespace firstlook

@@ -1,0 +1,64 @@
+#include "platform/linux/terminal.hpp"
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <string>
+
+using namespace firstlook;
+
+namespace {
+std::string read_some(int descriptor) {
+  std::array<char, 4096> text{};
+  const ssize_t got = read(descriptor, text.data(), text.size());
+  return {text.data(), got > 0 ? static_cast<std::size_t>(got) : 0};
+}
+}  // namespace
+
+TEST_CASE("into a file or pipe go whole lines only, no progress, no control sequences") {
+  int ends[2];
+  REQUIRE(pipe(ends) == 0);
+  {
+    Narrator narrator(ends[1]);
+    CHECK_FALSE(narrator.on_terminal());
+    narrator.progress("12 %");
+    narrator.line("sweep");
+    narrator.line(std::string(2000, 'x'));
+    Narrator quiet(ends[1], true);
+    quiet.line("not to be seen");
+  }
+  CHECK(read_some(ends[0]) == "sweep\n" + std::string(511, 'x') + "\n");
+  CHECK_FALSE(color_wanted(ends[1]));
+  close(ends[0]);
+  close(ends[1]);
+}
+
+TEST_CASE("on a terminal the progress line is rewritten and gives way to lines that stay") {
+  const int master = posix_openpt(O_RDWR | O_NOCTTY);
+  REQUIRE(master >= 0);
+  REQUIRE(grantpt(master) == 0);
+  REQUIRE(unlockpt(master) == 0);
+  const int terminal = open(ptsname(master), O_RDWR | O_NOCTTY);
+  REQUIRE(terminal >= 0);
+  {
+    Narrator narrator(terminal);
+    CHECK(narrator.on_terminal());
+    narrator.progress("1 %");
+    narrator.progress("2 %");
+    narrator.line("done");
+  }
+  CHECK(read_some(master) == "\r\x1b[K1 %\r\x1b[K2 %\r\x1b[Kdone\r\n");
+  setenv("TERM", "xterm", 1);
+  unsetenv("NO_COLOR");
+  CHECK(color_wanted(terminal));
+  setenv("NO_COLOR", "1", 1);
+  CHECK_FALSE(color_wanted(terminal));
+  unsetenv("NO_COLOR");
+  setenv("TERM", "dumb", 1);
+  CHECK_FALSE(color_wanted(terminal));
+  close(terminal);
+  close(master);
+}

@@ -1,0 +1,160 @@
+#include "algorithms/view_planning/explore.hpp"
+
+#include <catch2/catch.hpp>
+#include <thread>
+
+#include "algorithms/view_planning/remaining_reason.hpp"
+#include "algorithms/view_planning/sweep.hpp"
+#include "tests/unit/view_planning/small_world.hpp"
+
+using namespace firstlook;
+using namespace firstlook::test;
+
+namespace {
+
+/// Indices dealt out to two threads.
+void run_on_two(int n, IndexedBody body) {
+  const auto half = [&](int worker) {
+    for (int i = worker; i < n; i += 2) body(i, worker);
+  };
+  std::thread other(half, 1);
+  half(0);
+  other.join();
+}
+
+Truth room_with_wall() {
+  Truth truth = Truth::room();
+  truth.add_box({0.65, -0.4, -0.3}, {0.75, 0.4, 0.55});  // a screen in front of the arm
+  return truth;
+}
+const Eigen::Vector3d kPocketLow(0.75, -0.3, 0.0);  // behind it
+const Eigen::Vector3d kPocketHigh(1.0, 0.3, 0.45);
+
+/// Looks, and tells the chooser about it.
+void look_and_remember(SmallWorld& world, ViewChooser& chooser, const Path& path) {
+  world.follow(path);
+  chooser.remember_look(world.context(), world.q);
+}
+
+void sweep(SmallWorld& world, ViewChooser& chooser) {
+  SweepProgress progress = plan_sweep(world.arm, world.q, 0.99);
+  world.look(world.q);
+  world.update();
+  for (;;) {
+    const auto step = next_sweep_step(progress, world.context(), chooser.gain(), chooser.first_worker(),
+                                      chooser.planner(), world.q);
+    REQUIRE(step);
+    if (step->done) return;
+    look_and_remember(world, chooser, step->path);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("exploration sees behind the screen, keeps to known free space, and ends with a certificate", "[explore]") {
+  SmallWorld world(room_with_wall());
+  ViewChooser chooser(world.map.geometry(), world.sensor, 320, 2);
+  sweep(world, chooser);
+  const double pocket_after_sweep = world.coverage(kPocketLow, kPocketHigh);
+  std::vector<double> coverage{world.coverage()};
+  ExploreOptions options;
+  ViewChoice choice;
+  for (options.step = 0; options.step < 60; ++options.step) {
+    const auto chosen = chooser.choose(world.context(), world.q, options, run_on_two);
+    REQUIRE(chosen);
+    choice = *chosen;
+    if (choice.outcome != ViewChoice::Outcome::kChosen) break;
+    REQUIRE(choice.path.waypoints.front() == world.q);
+    REQUIRE(choice.path.waypoints.back() == choice.target);
+    REQUIRE(world.entries_into_unknown(choice.path) == 0);
+    look_and_remember(world, chooser, choice.path);
+    coverage.push_back(world.coverage());
+  }
+  std::string curve;
+  for (const double c : coverage) curve += fmt::format(" {:.3f}", c);
+  const auto clusters = find_remaining(world.map, world.zone, options.gain_min);
+  const auto reasons = explain_remaining(world.context(), chooser.gain(), clusters);
+  for (const auto& r : reasons) {
+    curve += fmt::format("\n{} voxels {} at {:.2f} {:.2f} {:.2f}", r.voxels, to_string(r.reason), r.center_m.x(),
+                         r.center_m.y(), r.center_m.z());
+  }
+  WARN("coverage over views:" << curve << "\npocket " << pocket_after_sweep << " -> "
+                              << world.coverage(kPocketLow, kPocketHigh) << ", unreached "
+                              << choice.certificate.unreached << ", best " << choice.certificate.gain_best);
+  REQUIRE(choice.outcome == ViewChoice::Outcome::kComplete);
+  REQUIRE(choice.certificate.random_samples >= 500);
+  REQUIRE(choice.certificate.gain_best < options.gain_min);
+  REQUIRE(choice.certificate.clusters == static_cast<int>(clusters.size()));
+  REQUIRE(pocket_after_sweep < 0.5);
+  REQUIRE(world.coverage(kPocketLow, kPocketHigh) > 0.85);
+  REQUIRE(coverage.back() > 0.95);
+}
+
+TEST_CASE("one seed gives one choice, with one worker and with two", "[explore]") {
+  SmallWorld world(room_with_wall());
+  ViewChooser one(world.map.geometry(), world.sensor, 200, 1);
+  ViewChooser two(world.map.geometry(), world.sensor, 200, 2);
+  world.look(world.q);
+  JointVector beside = world.q;
+  beside[0] += 0.2;
+  world.look(beside);
+  world.update();
+  const ExploreOptions options{.seed = 7};
+  const auto a = one.choose(world.context(), world.q, options, run_serially);
+  const auto b = two.choose(world.context(), world.q, options, run_on_two);
+  REQUIRE(a);
+  REQUIRE(b);
+  REQUIRE(a->outcome == ViewChoice::Outcome::kChosen);
+  REQUIRE(a->target == b->target);
+  REQUIRE(a->utility_per_s == b->utility_per_s);
+  REQUIRE(a->path.waypoints.size() == b->path.waypoints.size());
+  REQUIRE(a->gain.unknown == b->gain.unknown);
+  REQUIRE(a->considered == b->considered);
+  const auto c = one.choose(world.context(), world.q, {.seed = 8}, run_serially);
+  REQUIRE(c);
+  REQUIRE_FALSE(c->target == a->target);
+}
+
+TEST_CASE("an arm with no room to move says that nothing can be reached", "[explore]") {
+  SmallWorld world(Truth::room());
+  ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1, 300);
+  // Just enough of the zone for the posture it stands in.
+  while (configuration_margin(world.arm, world.body, world.space, world.clearance, world.q) > 0.0005) {
+    world.space.zone.radius_m -= 0.0004;
+  }
+  const double height_m = world.space.zone.height_m;
+  while (configuration_margin(world.arm, world.body, world.space, world.clearance, world.q) > 0.0004 &&
+         world.space.zone.height_m > height_m - 1) {
+    world.space.zone.height_m -= 0.0004;
+  }
+  world.space.field = nullptr;
+  ExploreOptions options;
+  options.certificate_samples = 300;
+  // The base could still turn in a cylinder: a plane on each side holds it.
+  const Capsules placed = place(world.body.capsules, forward(world.arm, world.q));
+  for (const double sign : {1.0, -1.0}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d normal = sign * Eigen::Vector3d::Unit(axis);
+      double lowest_m = 9;
+      for (const Capsule& c : placed) {
+        lowest_m = std::min({lowest_m, normal.dot(c.a) - c.radius_m, normal.dot(c.b) - c.radius_m});
+      }
+      world.space.keep_out_planes.push_back(
+          {.normal = normal, .offset_m = lowest_m - world.clearance.surface_m - 0.0005});
+    }
+  }
+  const auto choice = chooser.choose(world.context(), world.q, options, run_serially);
+  REQUIRE(choice);
+  REQUIRE(choice->outcome == ViewChoice::Outcome::kNothingReachable);
+}
+
+TEST_CASE("an arm that does not stand free gets no view", "[explore]") {
+  SmallWorld world(Truth::room());
+  world.space.zone_intact = false;
+  ViewChooser chooser(world.map.geometry(), world.sensor, 20, 1, 20);
+  ExploreOptions options;
+  options.certificate_samples = 20;
+  const auto choice = chooser.choose(world.context(), world.q, options, run_serially);
+  REQUIRE_FALSE(choice);
+  REQUIRE(choice.error().fault == Fault::kStartBlocked);
+}
