@@ -98,7 +98,8 @@ ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Ma
 
 std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
                                            ArmSigma start, const RefinementOptions& options) {
-  constexpr int kIterationsMax = 300;  // a step is about 50 us for 25 views; slow where the camera is weaker than the arm
+  constexpr int kIterationsMax =
+      300;  // a step is about 50 us for 25 views; slow where the camera is weaker than the arm
   constexpr double kChangeMin = 2e-5;
   for (int i = 0; i < kIterationsMax; ++i) {
     const auto solution = solve_linear(views, deviations, start);

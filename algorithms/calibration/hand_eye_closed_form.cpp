@@ -95,7 +95,7 @@ Eigen::Matrix3d tsai_lenz_rotation(std::span<const Motion> motions) {
     }
   }
   const double tangent = best.norm();
-  const Eigen::Vector3d rotation_vector = tangent < 1e-12 ? 2 * best : best * (2 * std::atan(tangent) / tangent);
+  const Eigen::Vector3d rotation_vector = best * (tangent < 1e-12 ? 2.0 : 2 * std::atan(tangent) / tangent);
   return rotation_exp(rotation_vector) * best_turn;
 }
 

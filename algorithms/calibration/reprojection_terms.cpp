@@ -7,7 +7,8 @@ namespace firstlook {
 std::optional<CornerTerm> corner_term(const CameraIntrinsics& camera, const ViewGeometry& geometry,
                                       const Eigen::Vector3d& corner_in_board) {
   const Eigen::Vector3d turned = geometry.base_T_board.linear() * corner_in_board;
-  const Eigen::Vector3d from_flange = turned + geometry.base_T_board.translation() - geometry.base_T_flange.translation();
+  const Eigen::Vector3d from_flange =
+      turned + geometry.base_T_board.translation() - geometry.base_T_flange.translation();
   const Eigen::Vector3d from_camera =
       geometry.base_T_flange.linear().transpose() * from_flange - geometry.flange_T_camera.translation();
   const Eigen::Matrix3d camera_R_flange = geometry.flange_T_camera.linear().transpose();

@@ -17,9 +17,10 @@ struct VerdictLimits {
   double sigma_translation_max_m = 0.001;  ///< largest of the three axes
   double sigma_rotation_max_rad = 0.002;
   double holdout_rms_max_px = 2.0;     ///< views left out of the solve, arm deviations included
+  double holdout_rms_max_m = 0.003;    ///< the board's centre as such views see it, against where the others put it
   double subset_spread_max_m = 0.003;  ///< RMS distance of 100 solves on 70 % of the views from the whole
   double gated_views_max = 0.25;       ///< share of the views that may be wrong
-  double voxel_size_m = 0.05;          ///< mapping: 3 sigma at mapping_distance_m within half of it (DESIGN 7.5)
+  double voxel_size_m = 0.05;          ///< mapping: 3 sigma at mapping_distance_m within half of it
   double mapping_distance_m = 1.5;
   double tolerance_m = 0.01;  ///< of the gripper, for the usable distance (thesis eq. 7-2)
   double usable_distance_min_m = 0.3;
@@ -39,6 +40,7 @@ enum class Verdict : std::uint8_t { kAccepted, kRejected };
 /// Everything that result.json's hand_eye object says, and what the report shows beside it.
 struct HandEyeResult {
   Transform<Flange, Camera> flange_T_camera;
+  Transform<Flange, Camera> closed_form;  ///< what the chosen solver alone gave: the refinement's start
   Transform<Base, Board> base_T_board;
   Matrix6d covariance = Matrix6d::Zero();  ///< of flange_T_camera: pose_difference, m and rad, flange axes
   Matrix6d board_covariance = Matrix6d::Zero();

@@ -5,10 +5,9 @@
 #include <span>
 
 #include "algorithms/calibration/hand_eye_refinement.hpp"
+#include "algorithms/calibration/reprojection_terms.hpp"
 
 namespace firstlook {
-
-using Matrix12d = Eigen::Matrix<double, 12, 12>;
 
 /// The present belief. A rough hand-eye from three views, or even from the drawing, is good enough.
 struct ViewDesignModel {

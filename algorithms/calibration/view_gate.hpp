@@ -20,12 +20,13 @@ namespace firstlook {
 [[nodiscard]] Transform<Base, Board> median_board_pose(std::span<const PosePair> pairs,
                                                        const Transform<Flange, Camera>& flange_T_camera);
 
-/// False for each view whose misfit is more than `gate` times the median misfit of all (and more than 0.5 mm and 1 mrad).
+/// False for each view whose misfit is more than `gate` times the median misfit of all (and more than 0.5 mm and 1
+/// mrad).
 [[nodiscard]] std::vector<bool> gate_views(std::span<const PosePair> pairs,
                                            const Transform<Flange, Camera>& flange_T_camera, double gate);
 
-/// Closed form that bears up to a third of wrong views: when one view stands out, the solve whose median misfit is least
-/// among random fours of views (Rousseeuw 1984) tells the good ones, which are then solved together.
+/// Closed form that bears up to a third of wrong views: when one view stands out, the solve whose median misfit is
+/// least among random fours of views (Rousseeuw 1984) tells the good ones, which are then solved together.
 /// @return the errors of solve_closed_form
 [[nodiscard]] Result<Transform<Flange, Camera>> robust_closed_form(std::span<const PosePair> pairs, Solver solver,
                                                                    double gate);

@@ -13,7 +13,9 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 constexpr double kPi = std::numbers::pi;
 constexpr double kSingularSine = 1e-9;  // of joint 5: below it the axes of joints 4 and 6 are parallel
-constexpr double kEdge = 1e-9;          // a cosine may exceed 1 by rounding at the edge of the reach
+constexpr double kNearby_rad = 0.01;    // factory corrections of UR arms stay within: Newton steps bridge them
+constexpr double kNearby_m = 0.005;
+constexpr double kEdge = 1e-9;  // a cosine may exceed 1 by rounding at the edge of the reach
 
 /// Pose error as a small displacement and rotation vector in base coordinates.
 Vector6 pose_error(const Pose& wanted, const Pose& is) {
@@ -37,7 +39,7 @@ bool polish(const ArmModel& arm, const Pose& wanted, JointVector& q) {
     // An antipodal rotation has no cross product either; the trace tells.
     const bool same_side = (wanted.linear().array() * flange.linear().array()).sum() > 2;
     if (same_side && largest < kGood) return true;
-    if (step == 6) return same_side && largest < kAccepted;
+    if (step == 8) return same_side && largest < kAccepted;
     Matrix6 jacobian;
     for (int j = 0; j < 6; ++j) {
       const Pose& before = frames.base_T_link[static_cast<std::size_t>(j)];
@@ -103,9 +105,10 @@ bool has_closed_form_inverse(const ArmModel& arm) {
   constexpr double kAlpha[] = {kPi / 2, 0, 0, kPi / 2, -kPi / 2, 0};
   for (std::size_t j = 0; j < 6; ++j) {
     const DhRow& row = arm.dh[j];
-    if (row.theta_offset_rad != 0 || std::abs(row.alpha_rad - kAlpha[j]) > 1e-12) return false;
+    if (std::abs(row.theta_offset_rad) > kNearby_rad || std::abs(row.alpha_rad - kAlpha[j]) > kNearby_rad) return false;
     const bool is_link = j == 1 || j == 2;
-    if (is_link ? (row.d_m != 0 || row.a_m == 0) : row.a_m != 0) return false;
+    if (is_link && (std::abs(row.d_m) > kNearby_m || std::abs(row.a_m) < 10 * kNearby_m)) return false;
+    if (!is_link && std::abs(row.a_m) > kNearby_m) return false;
   }
   return true;
 }
@@ -115,7 +118,7 @@ InverseSolutions inverse(const ArmModel& arm, const Transform<Base, Flange>& bas
   ENSURE(4021, has_closed_form_inverse(arm));
   InverseSolutions solutions;
   const Pose& flange = base_T_flange.pose();
-  const double d4 = arm.dh[3].d_m;
+  const double d4 = arm.dh[1].d_m + arm.dh[2].d_m + arm.dh[3].d_m;  // along parallel axes
   const double d5 = arm.dh[4].d_m;
   const double a2 = arm.dh[1].a_m;
   const double a3 = arm.dh[2].a_m;

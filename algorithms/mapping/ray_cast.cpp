@@ -129,6 +129,7 @@ GainCount count_unknown(const GridGeometry& geometry, std::span<const std::uint8
                         const Transform<Base, Depth>& base_T_depth, double range_min_m, UnknownReading reading,
                         GainScratch& scratch) {
   ENSURE(3033, plane.size() == geometry.count());
+  ENSURE(3034, base_T_depth.pose().matrix().allFinite());
   const Eigen::Matrix3d rotation = base_T_depth.rotation() / geometry.resolution_m;
   Ray ray;
   ray.origin = base_T_depth.translation() / geometry.resolution_m - geometry.first.cast<double>();

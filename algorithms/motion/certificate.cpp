@@ -96,7 +96,9 @@ class Proof {
 
   Certificate run() {
     result_.margin_m = kInfinity;
-    if (!end_is_free(from_, 0, Verdict::kStartBlocked) || !end_is_free(to_, 1, Verdict::kEndBlocked)) return result_;
+    if (!end_is_free(from_, 0, CertificateVerdict::kStartBlocked) ||
+        !end_is_free(to_, 1, CertificateVerdict::kEndBlocked))
+      return result_;
     FixedVector<Interval, 64> open;  // depth first: one waits on each level
     open.push_back(all_);
     while (!open.empty()) {
@@ -109,13 +111,13 @@ class Proof {
       open.push_back({here.middle + quarter, quarter, here.capsules, here.pairs});
       open.push_back({here.middle - quarter, quarter, here.capsules, here.pairs});
     }
-    result_.verdict = Verdict::kCertified;
+    result_.verdict = CertificateVerdict::kCertified;
     result_.fraction = 1;
     return result_;
   }
 
  private:
-  bool fail(Verdict verdict, double fraction, int capsule, bool self, double margin) {
+  bool fail(CertificateVerdict verdict, double fraction, int capsule, bool self, double margin) {
     result_.verdict = verdict;
     result_.fraction = fraction;
     result_.capsule = capsule;
@@ -124,7 +126,7 @@ class Proof {
     return false;
   }
 
-  bool end_is_free(const JointVector& q, double fraction, Verdict verdict) {
+  bool end_is_free(const JointVector& q, double fraction, CertificateVerdict verdict) {
     if (!within_limits(arm_, q)) return fail(verdict, fraction, -1, false, -kInfinity);
     ++result_.evaluations;
     const Capsules placed = place(body_.capsules, forward(arm_, q));
@@ -153,7 +155,8 @@ class Proof {
           std::sqrt(std::max(twists.velocity(c.link, c.a).squaredNorm(), twists.velocity(c.link, c.b).squaredNorm()));
       const double moves = travel(speed, i, at.half);
       const double margin = capsule_margin(space_, need_, c, {std::max(moves, kMarginMin_m), kMarginMin_m});
-      if (!(margin >= kMarginMin_m)) return fail(Verdict::kBlocked, at.middle, static_cast<int>(i), false, margin);
+      if (!(margin >= kMarginMin_m))
+        return fail(CertificateVerdict::kBlocked, at.middle, static_cast<int>(i), false, margin);
       if (margin < moves) continue;
       at.capsules.reset(i);
       result_.margin_m = std::min(result_.margin_m, margin - moves);
@@ -162,7 +165,7 @@ class Proof {
       if (!at.pairs.test(i)) continue;
       const SelfPair& pair = body_.self_pairs[i];
       const double margin = pair_margin(placed, pair);
-      if (!(margin >= kMarginMin_m)) return fail(Verdict::kBlocked, at.middle, pair.far, true, margin);
+      if (!(margin >= kMarginMin_m)) return fail(CertificateVerdict::kBlocked, at.middle, pair.far, true, margin);
       const double moves = relative_travel(twists, placed, pair, at.half, margin);
       if (margin < moves) continue;
       at.pairs.reset(i);

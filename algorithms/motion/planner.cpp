@@ -61,8 +61,9 @@ Status Planner::begin(const ArmModel& arm, const Body& body, const FreeSpace& sp
 Result<Path> Planner::plan_to(const JointVector& goal) {
   ENSURE(4133, arm_ != nullptr);
   const Certificate straight = check(start_, goal);
-  if (straight.verdict == Verdict::kStartBlocked) return blocked(Fault::kStartBlocked, "start", *body_, straight);
-  if (straight.verdict == Verdict::kEndBlocked) return blocked(Fault::kNoPath, "goal", *body_, straight);
+  if (straight.verdict == CertificateVerdict::kStartBlocked)
+    return blocked(Fault::kStartBlocked, "start", *body_, straight);
+  if (straight.verdict == CertificateVerdict::kEndBlocked) return blocked(Fault::kNoPath, "goal", *body_, straight);
   if (straight.certified()) {
     chain_.assign({start_, goal});
     return finish();

@@ -102,11 +102,11 @@ std::string view_figure(const CalibrationViewRecord& view, std::size_t number, c
   const Eigen::Vector3d flange = view.base_T_flange.translation();
   return fmt::format(
       "<figure class=\"shot\" id=\"view{0}\"><a href=\"#view{0}\">\n{1}</a>"
-      "<figcaption><b>{0}</b> · {2}{3}<br><span>{4} · flange at {5:.2f}, {6:.2f}, {7:.2f} m</span></figcaption>"
+      "<figcaption><b>{0}</b> · {2}{3}<br><span>{4:.0f} s · flange at {5:.2f}, {6:.2f}, {7:.2f} m</span></figcaption>"
       "<a class=\"close\" href=\"#calibration-views\">close</a></figure>\n",
       number, corner_picture(view, picture),
       view.reprojected_px.empty() ? std::string("not solved") : fmt::format("{:.3f} px", view.rms_px),
-      view.held_out ? " · held out" : "", duration_text(view.time_s), flange.x(), flange.y(), flange.z());
+      view.held_out ? " · held out" : "", view.time_s, flange.x(), flange.y(), flange.z());
 }
 
 }  // namespace

@@ -190,8 +190,6 @@ std::string residual_chart(std::span<const CalibrationViewRecord> views) {
   for (double r = ring; r <= limit * 1.0001; r += ring) {
     svg += fmt::format("<circle class=\"ring\" cx=\"{}\" cy=\"{}\" r=\"{:.1f}\"/>\n", kCentre, kCentre,
                        r / limit * kRadius);
-    svg +=
-        text_at(kCentre + 3, kCentre - r / limit * kRadius - 3, "start", fmt::format("{:.3g} px", r), "class=\"note\"");
   }
   svg += line(kCentre - kRadius, kCentre, kCentre + kRadius, kCentre, "grid");
   svg += line(kCentre, kCentre - kRadius, kCentre, kCentre + kRadius, "grid");
@@ -201,6 +199,10 @@ std::string residual_chart(std::span<const CalibrationViewRecord> views) {
     dots += fmt::format("M{:.1f} {:.1f}h0", kCentre + r.x() * scale, kCentre + r.y() * scale);
   }
   svg += fmt::format("<path class=\"dots\" stroke=\"{}\" d=\"{}\"/>\n", kBlue, dots);
+  for (double r = ring; r <= limit * 1.0001; r += ring) {
+    const std::string distance = fmt::format("{:.3g} px", r);
+    svg += text_at(kCentre + 3, kCentre - r / limit * kRadius - 3, "start", distance, "class=\"note\"");
+  }
   svg += text_at(kCentre, 262, "middle", fmt::format("{} corners", residuals.size()), "class=\"note\"");
   return svg + "</svg>\n";
 }

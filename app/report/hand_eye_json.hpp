@@ -8,7 +8,7 @@
 
 namespace firstlook {
 
-/// Every key of DESIGN 12 and, beside them, solver, arm_sigma, corner_sigma_px, subset_spread and ax_xb_residual. SI
+/// The contract's keys and, beside them, solver, closed_form, arm_sigma, corner_sigma_px, subset_spread and ax_xb_residual. SI
 /// units unless the name says otherwise; numbers that do not apply (no corners) are null.
 [[nodiscard]] nlohmann::json hand_eye_json(const HandEyeResult& result, std::string_view parent_link,
                                            std::string_view solver);

@@ -68,6 +68,11 @@ std::string escape_html(std::string_view text) {
 }
 
 HtmlTable::HtmlTable(std::initializer_list<std::string_view> header, int text_columns) : text_columns_(text_columns) {
+  // A table of names and values needs no header.
+  if (std::all_of(header.begin(), header.end(), [](std::string_view title) { return title.empty(); })) {
+    html_ = "<tbody>\n";
+    return;
+  }
   html_ = "<thead><tr>";
   int column = 0;
   for (const std::string_view title : header) append_cell("th", column++, title);

@@ -22,7 +22,7 @@ bool write_png(png_structp png, png_infop info, const std::uint8_t* pixels, int 
                channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   // Fixed, so that the bytes do not depend on the library's own choice.
-  png_set_compression_level(png, 9);
+  png_set_compression_level(png, 6);
   png_set_filter(png, 0, PNG_ALL_FILTERS);
   png_write_info(png, info);
   const std::size_t stride = static_cast<std::size_t>(width) * static_cast<std::size_t>(channels);

@@ -17,9 +17,9 @@ nav{font-size:13px;margin-bottom:16px}nav a{color:var(--soft);margin-right:14px;
 .banner{border-radius:10px;padding:18px 22px;color:#fff;margin-bottom:16px}
 .banner h2{margin:0 0 2px;font-size:24px;border:0;padding:0}.banner p{margin:0;font-size:16px}.banner ul{margin:8px 0 0;padding-left:20px}
 .good{background:var(--good)}.caution{background:var(--caution)}.bad{background:var(--bad)}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(140px,1fr));gap:12px;margin-bottom:16px}
-.tile{background:var(--card);border:1px solid var(--rule);border-radius:10px;padding:12px 14px}
-.tile b{display:block;font-size:21px;font-weight:600;white-space:nowrap}.tile span{display:block;color:var(--soft);font-size:12.5px;line-height:1.35}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(126px,1fr));gap:10px;margin-bottom:16px}
+.tile{background:var(--card);border:1px solid var(--rule);border-radius:10px;padding:11px 12px}
+.tile b{display:block;font-size:18px;font-weight:600;white-space:nowrap}.tile span{display:block;color:var(--soft);font-size:12.5px;line-height:1.35}
 section{background:var(--card);border:1px solid var(--rule);border-radius:10px;padding:18px 22px;margin-bottom:16px}
 h2{font-size:18px;margin:0 0 10px}h3{font-size:15px;margin:18px 0 6px}
 p{margin:8px 0}.hint{color:var(--soft);font-size:13.5px}
@@ -29,12 +29,11 @@ pre{background:#eef1f4;border-radius:8px;padding:10px 12px;overflow-x:auto;margi
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:14px;font-variant-numeric:tabular-nums}
 th{text-align:left;font-weight:600;color:var(--soft);font-size:12.5px;border-bottom:1px solid #cdd4dc;padding:5px 10px 5px 0}
-th:empty{padding:0;border:0}
 td{border-bottom:1px solid var(--rule);padding:5px 10px 5px 0;vertical-align:top;overflow-wrap:anywhere;white-space:pre-wrap}
 .num{text-align:right;white-space:nowrap}tr:last-child td{border-bottom:0}
 details{margin-top:10px}summary{cursor:pointer;color:var(--soft)}
 svg.chart{width:100%;height:auto;display:block}.chart text{font:12.5px system-ui,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;fill:var(--ink)}
-.chart .note{fill:var(--soft);font-size:12px}.chart .grid{stroke:#e6eaef}.chart .axis{stroke:#9aa5b1}.chart .mark{stroke:#9aa5b1;stroke-dasharray:3 3}
+.chart .note{fill:var(--soft);font-size:12px;paint-order:stroke;stroke:#fff;stroke-width:3px}.chart .grid{stroke:#e6eaef}.chart .axis{stroke:#9aa5b1}.chart .mark{stroke:#9aa5b1;stroke-dasharray:3 3}
 .chart .line{fill:none;stroke-width:2.2;stroke-linejoin:round}.chart .ring{fill:none;stroke:#d3d9e0}
 .chart .dots{stroke-width:3;stroke-linecap:round;stroke-opacity:.45;fill:none}
 .figure{max-width:860px}.pair{display:grid;grid-template-columns:minmax(0,5fr) minmax(0,3fr);gap:18px;align-items:start}

@@ -72,7 +72,7 @@ std::string summary_section(const RunRecord& record) {
   }
   html += "</div>\n" + tiles(record);
   if (!record.phases.empty()) {
-    html += "<section id=\"phases\">\n<h2>The job</h2>\n" + phase_chart(record.phases) + "</section>\n";
+    html += section("phases", "The job", "<div class=\"figure\">\n" + phase_chart(record.phases) + "</div>\n");
   }
   return html;
 }

@@ -155,13 +155,15 @@ class ColorFrame {
     const int r0 = std::max(r - 1, 0), r1 = std::min(r + 1, rays_.camera.height - 1);
     const std::size_t left = rays_.index(c0, r), right = rays_.index(c1, r);
     const std::size_t above = rays_.index(c, r0), below = rays_.index(c, r1);
-    const double dxc = (rays_.x[right] - rays_.x[left]) / (c1 - c0), dyc = (rays_.y[right] - rays_.y[left]) / (c1 - c0);
-    const double dxr = (rays_.x[below] - rays_.x[above]) / (r1 - r0), dyr = (rays_.y[below] - rays_.y[above]) / (r1 - r0);
+    const float columns = static_cast<float>(c1 - c0), rows = static_cast<float>(r1 - r0);
+    const float dxc = (rays_.x[right] - rays_.x[left]) / columns, dyc = (rays_.y[right] - rays_.y[left]) / columns;
+    const float dxr = (rays_.x[below] - rays_.x[above]) / rows, dyr = (rays_.y[below] - rays_.y[above]) / rows;
     const std::size_t pixel = rays_.index(c, r);
     for (int j = 0; j < n; ++j) {
       for (int i = 0; i < n; ++i) {
         const std::uint64_t bits = jitter_.bits(pixel * 64 + static_cast<std::size_t>(j * n + i));
-        const double dc = (i + uniform_of(bits, 0)) / n - 0.5, dr = (j + uniform_of(bits, 1)) / n - 0.5;
+        const float dc = (static_cast<float>(i) + uniform_of(bits, 0)) / static_cast<float>(n) - 0.5F;
+        const float dr = (static_cast<float>(j) + uniform_of(bits, 1)) / static_cast<float>(n) - 0.5F;
         visit(rays_.x[pixel] + dc * dxc + dr * dxr, rays_.y[pixel] + dc * dyc + dr * dyr);
       }
     }

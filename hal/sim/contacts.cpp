@@ -23,15 +23,15 @@ double largest_way_m(const Capsules& from, const Capsules& to) {
 
 }  // namespace
 
-Capsule true_housing(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera) {
+Capsule true_housing(int link, const Pose& link_T_camera) {
   const double half_axis_m = kHousingHalfLength_m - kHousingRadius_m;
-  return {flange_T_camera * Eigen::Vector3d(-half_axis_m, 0, 0), flange_T_camera * Eigen::Vector3d(half_axis_m, 0, 0),
-          kHousingRadius_m, arm.joints};
+  return {link_T_camera * Eigen::Vector3d(-half_axis_m, 0, 0), link_T_camera * Eigen::Vector3d(half_axis_m, 0, 0),
+          kHousingRadius_m, link};
 }
 
-Capsules true_capsules(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera, bool camera_on_arm) {
+Capsules true_capsules(const ArmModel& arm, int link, const Pose& link_T_camera) {
   Capsules capsules = true_body(arm);
-  if (camera_on_arm) capsules.push_back(true_housing(arm, flange_T_camera));
+  if (link > 0) capsules.push_back(true_housing(link, link_T_camera));
   return capsules;
 }
 
@@ -100,13 +100,22 @@ void ContactMonitor::check_voxels(const Capsules& placed) {
   for (const Capsule& capsule : placed) {
     if (exempt(capsule)) continue;
     walk_capsule(view_->geometry(), capsule, kOverlapTolerance_m,
-                 [&](const Eigen::Vector3i& voxel) { occupy(voxel, outside_grid); });
+                 [&](const Eigen::Vector3i& voxel) { occupy(capsule, voxel, outside_grid); });
   }
   if (outside_grid && !outside_) ++unknown_entries_;  // outside the grid nothing is known
   outside_ = outside_grid;
 }
 
-void ContactMonitor::occupy(const Eigen::Vector3i& voxel, bool& outside_grid) {
+/// Whether the part of the capsule that is nearest to the voxel lies inside the safe zone.
+bool ContactMonitor::in_zone(const Capsule& placed, const Eigen::Vector3i& voxel) const {
+  const Eigen::Vector3d axis = placed.b - placed.a;
+  const Eigen::Vector3d to_voxel = view_->geometry().center_m(voxel) - placed.a;
+  const double length2 = axis.squaredNorm();
+  const double t = length2 > 0 ? std::clamp(axis.dot(to_voxel) / length2, 0.0, 1.0) : 0.0;
+  return zone_.depth_m(placed.a + t * axis) >= placed.radius_m - kOverlapTolerance_m;
+}
+
+void ContactMonitor::occupy(const Capsule& placed, const Eigen::Vector3i& voxel, bool& outside_grid) {
   if (!view_->geometry().contains(voxel)) {
     outside_grid = true;
     return;
@@ -116,7 +125,8 @@ void ContactMonitor::occupy(const Eigen::Vector3i& voxel, bool& outside_grid) {
   if (last == check_number_) return;  // by another capsule
   const bool entered = last + 1 != check_number_;
   last = check_number_;
-  if (entered && !view_->free_for_motion(index)) ++unknown_entries_;
+  if (!entered || view_->free_for_motion(index)) return;
+  if (!view_->zone_intact() || !in_zone(placed, voxel)) ++unknown_entries_;
 }
 
 }  // namespace firstlook::sim

@@ -17,11 +17,10 @@ inline constexpr double kBodyStep_m = 0.002;          ///< no body point moves f
 inline constexpr double kOverlapTolerance_m = 1e-6;   ///< less than this is rounding, not an entry
 
 /// The camera's housing as it is: a Kinect is 0.28 m wide along x of the colour camera and 0.07 m deep.
-[[nodiscard]] Capsule true_housing(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera);
+[[nodiscard]] Capsule true_housing(int link, const Pose& link_T_camera);
 
-/// The arm's true geometry and the camera's, in link frames.
-[[nodiscard]] Capsules true_capsules(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera,
-                                     bool camera_on_arm = true);
+/// The arm's true geometry and that of the camera on one of its links, in link frames; link 0: the camera is not on the arm.
+[[nodiscard]] Capsules true_capsules(const ArmModel& arm, int link, const Pose& link_T_camera);
 
 class ContactMonitor final : public BodyWatcher {
  public:
@@ -45,7 +44,8 @@ class ContactMonitor final : public BodyWatcher {
   void check_zone(const Capsules& placed);
   void check_voxels(const Capsules& placed);
   /// One voxel that the body overlaps now.
-  void occupy(const Eigen::Vector3i& voxel, bool& outside_grid);
+  void occupy(const Capsule& placed, const Eigen::Vector3i& voxel, bool& outside_grid);
+  [[nodiscard]] bool in_zone(const Capsule& placed, const Eigen::Vector3i& voxel) const;
   [[nodiscard]] bool exempt(const Capsule& placed) const;
 
   const ArmModel arm_;

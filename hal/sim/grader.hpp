@@ -24,6 +24,9 @@ class KnownFreeView {
   [[nodiscard]] virtual const GridGeometry& geometry() const = 0;
   /// True where the body may be at this moment: known free, or intact safe zone.
   [[nodiscard]] virtual bool free_for_motion(std::size_t voxel) const = 0;
+  /// True while no hit has revoked any part of the safe zone: then what lies inside its cylinder is free, also where the
+  /// cylinder cuts through a voxel.
+  [[nodiscard]] virtual bool zone_intact() const { return false; }
 };
 
 /// What a run ends with. Parts that were not reached stay empty.
@@ -72,7 +75,7 @@ class Grader {
   [[nodiscard]] virtual TruthFigures grade(const FinalClaims& claims) = 0;
   /// Known share of each region's observable voxels now, e.g. after the sweep; only counted for maps of one geometry.
   [[nodiscard]] virtual std::vector<RegionFigure> regions(const FinalClaims& claims) = 0;
-  /// The true mount, for reports and tests.
+  /// The true mount, for reports and tests; means nothing for a camera that is not on the flange.
   [[nodiscard]] virtual Transform<Flange, Camera> true_flange_T_camera() const = 0;
 };
 

@@ -10,5 +10,7 @@ inline constexpr std::uint64_t kEncoderStream = 5102;
 inline constexpr std::uint64_t kColorDropStream = 5103;
 inline constexpr std::uint64_t kDepthDropStream = 5104;
 inline constexpr std::uint64_t kObservableStream = 5105;
+inline constexpr std::uint64_t kColorNoiseStream = 5106;
+inline constexpr std::uint64_t kDepthNoiseStream = 5107;
 
 }  // namespace firstlook::sim

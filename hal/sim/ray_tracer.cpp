@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "hal/sim/triangulation.hpp"
 #include "platform/core/ensure.hpp"
 
 namespace firstlook::sim {
@@ -14,42 +14,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t kPacket = 8;
-constexpr int kCylinderSides = 96;  // inscribed polygon: less than 0.06 % of the radius inside the true surface
-
-Mesh triangulate(const Box& box) {
-  Mesh mesh;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d sign(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
-    mesh.vertices_m.push_back(sign.cwiseProduct(box.half_m));
-  }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
-
-Mesh triangulate(const Cylinder& cylinder) {
-  Mesh mesh;
-  mesh.vertices_m = {{0, 0, -cylinder.half_height_m}, {0, 0, cylinder.half_height_m}};
-  for (int i = 0; i < kCylinderSides; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kCylinderSides;
-    const double x = cylinder.radius_m * std::cos(angle), y = cylinder.radius_m * std::sin(angle);
-    mesh.vertices_m.emplace_back(x, y, -cylinder.half_height_m);
-    mesh.vertices_m.emplace_back(x, y, cylinder.half_height_m);
-  }
-  for (std::uint32_t i = 0; i < kCylinderSides; ++i) {
-    const std::uint32_t low = 2 + 2 * i, next = 2 + 2 * ((i + 1) % kCylinderSides);
-    mesh.triangles.push_back({0, next, low});
-    mesh.triangles.push_back({1, low + 1, next + 1});
-    mesh.triangles.push_back({low, next, low + 1});
-    mesh.triangles.push_back({next, next + 1, low + 1});
-  }
-  return mesh;
-}
-
-Mesh triangulate(const Mesh& mesh) { return mesh; }
 
 void attach(RTCDevice device, RTCScene scene, const Solid& solid, unsigned id) {
-  const Mesh mesh = std::visit([](const auto& shape) { return triangulate(shape); }, solid.shape);
+  const Mesh mesh = triangulate(solid.shape);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                3 * sizeof(float), mesh.vertices_m.size()));

@@ -71,6 +71,9 @@ struct CameraMount {
   [[nodiscard]] Transform<Flange, Camera> flange_T_camera() const { return Transform<Flange, Camera>(link_T_camera); }
 };
 
+/// A first Kinect on the last of `joints` links: 640x480, the colour camera looking along z, 7 cm to the side and 6 cm ahead.
+[[nodiscard]] CameraMount default_mount(int joints);
+
 /// A part of the cell that reports and tests ask for by name: a box in base coordinates.
 struct Region {
   std::string name;

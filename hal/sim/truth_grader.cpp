@@ -27,7 +27,7 @@ bool in_region(const NamedRegion& region, const Eigen::Vector3d& p) {
 
 TruthGrader::TruthGrader(const Truth& truth)
     : truth_(truth),
-      monitor_(truth.arm, true_capsules(truth.arm, truth.flange_T_camera, truth.camera_on_arm),
+      monitor_(truth.arm, true_capsules(truth.arm, truth.link, truth.link_T_camera),
                base_allowance(truth.arm), truth.space.zone, *truth.world),
       workers_(truth.workers) {}
 
@@ -42,9 +42,9 @@ const ObservableSet& TruthGrader::observable(const GridGeometry& geometry, const
     problem.arm = &truth_.arm;
     problem.world = truth_.world;
     problem.geometry = geometry;
-    problem.body = body_with_camera(truth_.arm, truth_.flange_T_camera);
-    problem.true_capsules = true_capsules(truth_.arm, truth_.flange_T_camera);
-    problem.flange_T_depth = truth_.flange_T_camera * truth_.camera_T_depth;
+    problem.body = body_with_camera(truth_.arm, true_flange_T_camera());
+    problem.true_capsules = true_capsules(truth_.arm, truth_.link, truth_.link_T_camera);
+    problem.flange_T_depth = true_flange_T_camera() * truth_.camera_T_depth;
     problem.sensor = truth_.depth;
     problem.space = truth_.space;
     problem.start_rad = truth_.start_rad;
@@ -58,7 +58,7 @@ const ObservableSet& TruthGrader::observable(const GridGeometry& geometry, const
 std::vector<RegionFigure> TruthGrader::regions(const FinalClaims& claims) {
   const memory::SimulationScope simulation;
   std::vector<RegionFigure> figures;
-  if (claims.map == nullptr || !truth_.camera_on_arm) return figures;
+  if (claims.map == nullptr || !camera_on_flange()) return figures;
   const GridGeometry& geometry = claims.map->geometry();
   const ObservableSet& set = observable(geometry, claims.observable);
   for (const NamedRegion& region : truth_.regions) {
@@ -77,8 +77,8 @@ std::vector<RegionFigure> TruthGrader::regions(const FinalClaims& claims) {
 }
 
 void TruthGrader::grade_hand_eye(const FinalClaims& claims, TruthFigures& figures) const {
-  if (!claims.flange_T_camera) return;
-  const Vector6d d = difference(truth_.flange_T_camera.pose(), claims.flange_T_camera->pose());
+  if (!claims.flange_T_camera || !camera_on_flange()) return;
+  const Vector6d d = difference(truth_.link_T_camera, claims.flange_T_camera->pose());
   figures.hand_eye_error_mm = 1e3 * d.head<3>().norm();
   figures.hand_eye_error_mrad = 1e3 * d.tail<3>().norm();
   const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(claims.covariance);
@@ -88,7 +88,7 @@ void TruthGrader::grade_hand_eye(const FinalClaims& claims, TruthFigures& figure
 }
 
 void TruthGrader::grade_map(const FinalClaims& claims, TruthFigures& figures) {
-  if (claims.map == nullptr || !truth_.camera_on_arm) return;
+  if (claims.map == nullptr || !camera_on_flange()) return;
   const VoxelMap& map = *claims.map;
   const GridGeometry& geometry = map.geometry();
   const ObservableSet& set = observable(geometry, claims.observable);

@@ -23,10 +23,10 @@ struct NamedRegion {
 struct Truth {
   ArmModel arm;
   const TrueWorld* world = nullptr;
-  Transform<Flange, Camera> flange_T_camera;
+  int link = 6;  ///< that carries the camera; 0: none
+  Pose link_T_camera = Pose::Identity();
   Transform<Camera, Depth> camera_T_depth;
   CameraIntrinsics depth;
-  bool camera_on_arm = true;
   FreeSpace space;  ///< safe zone and keep-outs as configured
   JointVector start_rad;
   std::vector<NamedRegion> regions;
@@ -45,9 +45,13 @@ class TruthGrader final : public Grader {
   [[nodiscard]] std::uint64_t unknown_entries() const override { return monitor_.unknown_entries(); }
   [[nodiscard]] TruthFigures grade(const FinalClaims& claims) override;
   [[nodiscard]] std::vector<RegionFigure> regions(const FinalClaims& claims) override;
-  [[nodiscard]] Transform<Flange, Camera> true_flange_T_camera() const override { return truth_.flange_T_camera; }
+  [[nodiscard]] Transform<Flange, Camera> true_flange_T_camera() const override {
+    return Transform<Flange, Camera>(truth_.link_T_camera);
+  }
 
  private:
+  /// A hand-eye transform and views from all around exist only for a camera on the flange.
+  [[nodiscard]] bool camera_on_flange() const { return truth_.link == truth_.arm.joints; }
   /// Computed once for each geometry and set of options.
   const ObservableSet& observable(const GridGeometry& geometry, const ObservableOptions& options);
   void grade_hand_eye(const FinalClaims& claims, TruthFigures& figures) const;

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "platform/linux/thread.hpp"
-#include "platform/loop/function_ref.hpp"
+#include "platform/core/function_ref.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {

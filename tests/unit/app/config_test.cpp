@@ -198,3 +198,9 @@ TEST_CASE("the program's version is the build's", "[config]") {
   const std::string cmake((std::istreambuf_iterator<char>(file)), {});
   CHECK_THAT(cmake, Contains("project(firstlook VERSION " + version_text() + " "));
 }
+
+TEST_CASE("explain knows every fault and refuses the rest", "[config]") {
+  CHECK(run_explain_command("E5004") == 0);
+  CHECK(run_explain_command("5004") == 0);
+  for (const char* wrong : {"", "E", "E9999", "5004x", "protective stop"}) CHECK(run_explain_command(wrong) == 2);
+}

@@ -35,7 +35,11 @@ TEST_CASE("what link 1 carries beyond the allowance is not exempt") {
   const ArmModel arm = *find_arm_model("ur5");
   Body body = bare_body(arm);
   attach(body, arm, {{0, 0.3, 0}, {0, 0.4, 0}, 0.05, 1}, 2);
-  CHECK(body.exempt.back() == 0);
+  CHECK(body.exempt.back() == 0);  // too high
+  attach(body, arm, {{0, 0, 0.3}, {0, 0, 0.4}, 0.05, 1}, 2);
+  CHECK(body.exempt.back() == 0);  // too far out
+  attach(body, arm, {{0, 0, 0.1}, {0, 0, 0.2}, 0.05, 1}, 2);
+  CHECK(body.exempt.back() == 1);
   CHECK(body.capsules.size() == body.levers.size());
   CHECK(body.capsules.size() == body.exempt.size());
 }

@@ -135,7 +135,7 @@ TEST_CASE("a start in contact is said to be blocked, not the path") {
   JointVector to = start;
   to[0] += 0.5;
   const Certificate proof = certify(arm, body, space, {.surface_m = 0.01}, start, to);
-  CHECK(proof.verdict == Verdict::kStartBlocked);
+  CHECK(proof.verdict == CertificateVerdict::kStartBlocked);
   CHECK(proof.fraction == 0);
   CHECK(proof.capsule >= 0);
   CHECK(proof.margin_m == Approx(margin).margin(1e-12));
@@ -152,10 +152,10 @@ TEST_CASE("ends outside the joint limits are blocked") {
   JointVector beyond = default_start(arm);
   beyond[0] = 6.4;
   const Certificate proof = certify(arm, body, space, {}, default_start(arm), beyond);
-  CHECK(proof.verdict == Verdict::kEndBlocked);
+  CHECK(proof.verdict == CertificateVerdict::kEndBlocked);
   CHECK(proof.capsule == -1);
   beyond[0] = std::numeric_limits<double>::quiet_NaN();
-  CHECK(certify(arm, body, space, {}, beyond, default_start(arm)).verdict == Verdict::kStartBlocked);
+  CHECK(certify(arm, body, space, {}, beyond, default_start(arm)).verdict == CertificateVerdict::kStartBlocked);
 }
 
 TEST_CASE("a thin obstacle between two free ends is never jumped over") {
@@ -207,6 +207,6 @@ TEST_CASE("the arm does not pass through itself") {
   JointVector to = from;
   to[4] = 4.8;  // the hand sweeps over the forearm
   const Certificate proof = certify(arm, body, space, {}, from, to);
-  CHECK(proof.verdict == Verdict::kBlocked);
+  CHECK(proof.verdict == CertificateVerdict::kBlocked);
   CHECK(proof.self_collision);
 }

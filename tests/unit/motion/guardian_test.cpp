@@ -59,6 +59,19 @@ TEST_CASE("deviation is at least what any sampled body point is displaced by") {
   }
 }
 
+TEST_CASE("a small thing deep inside a large capsule is seen") {
+  const Body body = body_with_envelope(kArm);
+  FreeSpace space;
+  const JointVector q = default_start(kArm);
+  const Eigen::Vector3d hand = forward(kArm, q).flange().translation();
+  REQUIRE(check(kArm, body, space, {}, q, std::nullopt).fine());
+  space.keep_out_boxes.push_back({hand - Eigen::Vector3d::Constant(0.002), hand + Eigen::Vector3d::Constant(0.002)});
+  const GuardianVerdict verdict = check(kArm, body, space, {}, q, std::nullopt);
+  CHECK(verdict.finding == GuardianFinding::kNotFree);
+  CHECK(verdict.margin_m < -0.15);
+  CHECK(verdict.capsule >= 0);
+}
+
 TEST_CASE("the guardian agrees with certified paths and sees bodies that leave free space") {
   const Body body = bare_body(kArm);
   const ClearanceTerms terms = required_clearance({});

@@ -22,7 +22,7 @@ class TestView final : public KnownFreeView {
 };
 
 ContactMonitor monitor_in(const TrueWorld& world) {
-  return {kArm, true_capsules(kArm, kMount), base_allowance(kArm), SafeZone{}, world};
+  return {kArm, true_capsules(kArm, kArm.joints, kMount.pose()), base_allowance(kArm), SafeZone{}, world};
 }
 
 JointVector turned(double base_rad) {
@@ -158,7 +158,7 @@ TEST_CASE("distance along a ray to a capsule against marching", "[sim][contacts]
 }
 
 TEST_CASE("the camera's housing lies inside what the program takes for it", "[sim][contacts]") {
-  const Capsule housing = true_housing(kArm, kMount);
+  const Capsule housing = true_housing(kArm.joints, kMount.pose());
   const Body program = body_with_camera(kArm, kMount);
   Random random(5);
   for (int i = 0; i < 2000; ++i) {

@@ -17,8 +17,7 @@ Truth truth_in(const TrueWorld& world) {
   Truth truth;
   truth.arm = *find_arm_model("ur5");
   truth.world = &world;
-  truth.flange_T_camera = Transform<Flange, Camera>(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX())),
-                                                    Eigen::Vector3d(0, -0.06, 0.05));
+  truth.link_T_camera = Eigen::Translation3d(0, -0.06, 0.05) * Pose(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()));
   truth.depth = {640, 480, 589, 609, 319.5, 239.5};
   truth.start_rad = default_start(truth.arm);
   truth.workers = 1;

@@ -20,7 +20,7 @@ ObservableProblem problem_in(const TrueWorld& world, int samples) {
   p.world = &world;
   p.geometry = GridGeometry::covering({-1.5, -1.5, -0.3}, {1.5, 1.5, 1.5}, 0.1);
   p.body = body_with_camera(kArm, kMount);
-  p.true_capsules = true_capsules(kArm, kMount);
+  p.true_capsules = true_capsules(kArm, kArm.joints, kMount.pose());
   p.flange_T_depth = Transform<Flange, Depth>(kMount.pose());
   p.sensor = {640, 480, 589, 609, 319.5, 239.5};  // 57 x 43 degrees
   p.start_rad = default_start(kArm);

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "platform/loop/function_ref.hpp"
+#include "platform/core/function_ref.hpp"
 
 using namespace firstlook;
 

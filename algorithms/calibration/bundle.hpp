@@ -1,0 +1,48 @@
+/// The non-linear part of the refinement: reprojection errors of all views and priors on the arm's deviations.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "algorithms/calibration/hand_eye_refinement.hpp"
+#include "algorithms/calibration/reprojection_terms.hpp"
+
+namespace firstlook {
+
+/// One view as the bundle sees it.
+struct BundleView {
+  Pose base_T_flange_said = Pose::Identity();
+  std::span<const Eigen::Vector2d> corners_px;
+  std::span<const double> weights;  ///< one for each corner, 0 to 1
+};
+
+/// What is solved for.
+struct BundleState {
+  Pose flange_T_camera = Pose::Identity();
+  Pose base_T_board = Pose::Identity();
+  std::vector<Vector6d> deviations;  ///< true flange against said, one for each view
+};
+
+struct BundleNoise {
+  double corner_sigma_px = 0;
+  ArmSigma arm_sigma;
+};
+
+/// Minimises the whitened squares from `state` on, at most `iterations_max` steps. Single thread, deterministic.
+/// @return kSolveFailed when a corner has no image at the start, for numbers that are not finite, or when no step
+/// helps; kOutOfMemory
+[[nodiscard]] Status solve_bundle(const CameraIntrinsics& camera, const BoardSpec& board,
+                                  std::span<const BundleView> views, const BundleNoise& noise, int iterations_max,
+                                  BundleState& state);
+
+/// Normal equations of each view at `state`, weights in 1 / px^2.
+struct LinearizedBundle {
+  std::vector<ViewNormal> views;
+  std::vector<double> squared_px;   ///< weighted sum of squared residuals of each view
+  double weighted_coordinates = 0;  ///< two for each corner of weight 1
+};
+[[nodiscard]] Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera, const BoardSpec& board,
+                                                        std::span<const BundleView> views, double corner_sigma_px,
+                                                        const BundleState& state);
+
+}  // namespace firstlook

@@ -1,0 +1,270 @@
+#include "algorithms/calibration/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "algorithms/calibration/view_gate.hpp"
+#include "algorithms/vision/board_pose.hpp"
+#include "algorithms/vision/camera_model.hpp"
+#include "platform/core/random.hpp"
+
+namespace firstlook {
+namespace {
+
+using Indices = std::vector<std::size_t>;
+
+/// What validation needs of a calibration, whether it came from corners or from pose pairs.
+struct Validation {
+  std::vector<PosePair> pairs;                                ///< of the used views
+  std::function<Result<Refinement>(const Indices&)> resolve;  ///< a short solve with some of them
+  /// Sum of squared reprojection errors (px^2, both coordinates) of one view under a solution; empty without corners.
+  std::function<double(std::size_t, const Refinement&)> squared_px;
+  double corners = 0;
+  Eigen::Vector3d board_center = Eigen::Vector3d::Zero();
+};
+
+/// Options of a short solve around a known one: its sigmas, one round, no gating.
+RefinementOptions short_options(const HandEyeOptions& options, const HandEyeResult& result) {
+  RefinementOptions quick = options.refinement;
+  quick.corner_sigma_px = result.corner_sigma_px;
+  quick.arm_sigma = result.arm_sigma;
+  quick.rounds_max = 1;
+  quick.iterations_max = 10;
+  quick.view_gate = 1e12;
+  return quick;
+}
+
+/// Each used view is predicted once by a solve without it: five interleaved groups are left out in turn.
+void hold_out(const Validation& validation, HandEyeResult& result) {
+  const std::size_t n = validation.pairs.size();
+  const std::size_t groups = std::min<std::size_t>(5, n);
+  double squared_px = 0, squared_m = 0, views = 0;
+  for (std::size_t group = 0; group < groups; ++group) {
+    Indices others;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i % groups != group) others.push_back(i);
+    }
+    const auto solved = validation.resolve(others);
+    if (!solved) continue;
+    for (std::size_t i = group; i < n; i += groups) {
+      const auto seen =
+          validation.pairs[i].base_T_flange * solved->flange_T_camera * validation.pairs[i].camera_T_board;
+      squared_m += (seen * validation.board_center - solved->base_T_board * validation.board_center).squaredNorm();
+      if (validation.squared_px) squared_px += validation.squared_px(i, *solved);
+      views += 1;
+    }
+  }
+  if (views == 0) return;
+  result.holdout_rms_m = std::sqrt(squared_m / views);
+  if (validation.squared_px) result.holdout_rms_px = std::sqrt(squared_px / (2 * validation.corners * views));
+}
+
+/// `count` of 0 .. n-1 without repetition, in ascending order.
+Indices random_subset(std::size_t n, std::size_t count, Random& random) {
+  Indices all(n);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  for (std::size_t i = 0; i < count; ++i) {
+    std::swap(all[i], all[i + static_cast<std::size_t>(random.below(static_cast<int>(n - i)))]);
+  }
+  all.resize(count);
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+/// Returns how many of the solves failed.
+int spread_of_subsets(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
+  Random random(options.seed, 2201);
+  const std::size_t n = validation.pairs.size();
+  const auto share = static_cast<std::size_t>(std::ceil(options.subset_share * static_cast<double>(n)));
+  const std::size_t count = std::min(n, std::max<std::size_t>(3, share));
+  double squared_m = 0, squared_rad = 0;
+  int solved = 0;
+  for (int i = 0; i < options.subset_solves; ++i) {
+    const auto subset = validation.resolve(random_subset(n, count, random));
+    if (!subset) continue;
+    const Vector6d d = pose_difference(subset->flange_T_camera.pose(), result.flange_T_camera.pose());
+    squared_m += d.head<3>().squaredNorm();
+    squared_rad += d.tail<3>().squaredNorm();
+    ++solved;
+  }
+  if (solved > 0) {
+    result.subset_spread_m = std::sqrt(squared_m / solved);
+    result.subset_spread_rad = std::sqrt(squared_rad / solved);
+  }
+  return options.subset_solves - solved;
+}
+
+void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, HandEyeResult& result) {
+  std::vector<std::string>& reasons = result.reasons;
+  reasons.clear();
+  const auto reject_above = [&](double value, double limit, double to_text, const char* text, const char* unit) {
+    if (!(value <= limit)) {
+      reasons.push_back(
+          fmt::format("{} {:.3g} {}, allowed {:.3g} {}", text, value * to_text, unit, limit * to_text, unit));
+    }
+  };
+  const auto gated = std::count_if(result.fits.begin(), result.fits.end(), [](const ViewFit& f) { return !f.used; });
+  if (result.views < limits.views_min) {
+    reasons.push_back(fmt::format("{} usable views, {} are the least", result.views, limits.views_min));
+  }
+  if (static_cast<double>(gated) > limits.gated_views_max * static_cast<double>(result.fits.size())) {
+    reasons.push_back(fmt::format("{} of {} views contradict the others", gated, result.fits.size()));
+  }
+  reject_above(result.sigma_translation_m.maxCoeff(), limits.sigma_translation_max_m, 1e3, "sigma of translation",
+               "mm");
+  reject_above(result.sigma_rotation_rad.maxCoeff(), limits.sigma_rotation_max_rad, 1e3, "sigma of rotation", "mrad");
+  reject_above(3 * point_sigma(result.flange_T_camera, result.covariance, limits.mapping_distance_m),
+               limits.voxel_size_m / 2, 1e3, "3 sigma at the mapping distance", "mm");
+  if (result.holdout_rms_m == 0) {
+    reasons.emplace_back("too few views to hold any out");
+  } else {
+    reject_above(result.holdout_rms_px, limits.holdout_rms_max_px, 1, "held-out views miss by RMS", "px");
+    reject_above(result.holdout_rms_m, limits.holdout_rms_max_m, 1e3, "held-out views see the board off by RMS", "mm");
+  }
+  reject_above(result.subset_spread_m, limits.subset_spread_max_m, 1e3, "solves on subsets of the views spread by RMS",
+               "mm");
+  if (2 * failed_subsets > subset_solves) {
+    reasons.push_back(fmt::format("{} of {} solves on subsets of the views failed", failed_subsets, subset_solves));
+  }
+  if (result.usable_distance_m < limits.usable_distance_min_m) {
+    reasons.push_back(fmt::format("usable distance {:.2f} m for a tolerance of {:.0f} mm, least {:.2f} m",
+                                  result.usable_distance_m, limits.tolerance_m * 1e3, limits.usable_distance_min_m));
+  }
+  result.verdict = reasons.empty() ? Verdict::kAccepted : Verdict::kRejected;
+}
+
+void validate(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
+  result.holdout_rms_px = result.holdout_rms_m = 0;
+  result.subset_spread_m = result.subset_spread_rad = 0;
+  hold_out(validation, result);
+  const int failed = spread_of_subsets(validation, options, result);
+  result.usable_distance_m = usable_distance(result.flange_T_camera, result.covariance, options.limits.tolerance_m);
+  judge(options.limits, failed, options.subset_solves, result);
+}
+
+HandEyeResult start_result(const Refinement& refinement, std::span<const PosePair> used_pairs) {
+  HandEyeResult result;
+  result.flange_T_camera = refinement.flange_T_camera;
+  result.base_T_board = refinement.base_T_board;
+  result.covariance = refinement.covariance;
+  result.board_covariance = refinement.board_covariance;
+  result.sigma_translation_m = refinement.covariance.diagonal().head<3>().cwiseMax(0).cwiseSqrt();
+  result.sigma_rotation_rad = refinement.covariance.diagonal().tail<3>().cwiseMax(0).cwiseSqrt();
+  result.reprojection_rms_px = refinement.reprojection_rms_px;
+  result.corner_sigma_px = refinement.corner_sigma_px;
+  result.arm_sigma = refinement.arm_sigma;
+  result.ax_xb_all_pairs = ax_xb_residual_all_pairs(used_pairs, refinement.flange_T_camera);
+  result.ax_xb_consecutive = ax_xb_residual_consecutive(used_pairs, refinement.flange_T_camera);
+  result.views = refinement.views_used;
+  result.fits = refinement.views;
+  return result;
+}
+
+/// Views and their pose pairs that `fits` calls used (all that show a board when it is empty).
+struct UsedViews {
+  std::vector<CalibrationView> views;
+  std::vector<PosePair> pairs;
+};
+
+UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+                       std::span<const ViewFit> fits) {
+  UsedViews used;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (i < fits.size() && !fits[i].used) continue;
+    const auto pose = estimate_board_pose(camera, board, views[i].corners_px, 5.0);
+    if (!pose) continue;
+    used.views.push_back(views[i]);
+    used.pairs.push_back({views[i].base_T_flange, pose->camera_T_board});
+  }
+  return used;
+}
+
+double squared_error_px(const CameraIntrinsics& camera, const BoardSpec& board, const CalibrationView& view,
+                        const Transform<Flange, Camera>& flange_T_camera, const Transform<Base, Board>& base_T_board) {
+  const auto camera_T_board = (view.base_T_flange * flange_T_camera).inverse() * base_T_board;
+  constexpr double kNoImage_px = 1e4;
+  double squared = 0;
+  for (int i = 0; i < board.corners(); ++i) {
+    const auto pixel = project(camera, camera_T_board * board.corner(i));
+    squared +=
+        pixel ? (*pixel - view.corners_px[static_cast<std::size_t>(i)]).squaredNorm() : kNoImage_px * kNoImage_px;
+  }
+  return squared;
+}
+
+}  // namespace
+
+double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+                        const Transform<Flange, Camera>& flange_T_camera, const Transform<Base, Board>& base_T_board) {
+  double squared = 0;
+  for (const CalibrationView& view : views) {
+    squared += squared_error_px(camera, board, view, flange_T_camera, base_T_board);
+  }
+  return views.empty() ? 0 : std::sqrt(squared / (2.0 * board.corners() * static_cast<double>(views.size())));
+}
+
+Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+                                     std::span<const CalibrationView> views, const HandEyeOptions& options) {
+  const UsedViews seen = select_views(camera, board, views, {});
+  const auto start = robust_closed_form(seen.pairs, options.solver, options.refinement.view_gate);
+  if (!start) return std::unexpected(start.error());
+  const auto refinement = refine_hand_eye(camera, board, views, *start, options.refinement);
+  if (!refinement) return std::unexpected(refinement.error());
+  HandEyeResult result = start_result(*refinement, select_views(camera, board, views, refinement->views).pairs);
+  result.closed_form = *start;
+  return result;
+}
+
+void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+                       const HandEyeOptions& options, HandEyeResult& result) {
+  const UsedViews used = select_views(camera, board, views, result.fits);
+  const RefinementOptions quick = short_options(options, result);
+  Validation validation;
+  validation.pairs = used.pairs;
+  validation.board_center = board.center();
+  validation.corners = board.corners();
+  validation.resolve = [&](const Indices& indices) {
+    std::vector<CalibrationView> some;
+    for (const std::size_t i : indices) some.push_back(used.views[i]);
+    return refine_hand_eye(camera, board, some, result.flange_T_camera, quick);
+  };
+  validation.squared_px = [&](std::size_t i, const Refinement& r) {
+    return squared_error_px(camera, board, used.views[i], r.flange_T_camera, r.base_T_board);
+  };
+  validate(validation, options, result);
+}
+
+Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+                                         std::span<const CalibrationView> views, const HandEyeOptions& options) {
+  auto result = solve_hand_eye(camera, board, views, options);
+  if (result) validate_hand_eye(camera, board, views, options, *result);
+  return result;
+}
+
+Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pairs, const HandEyeOptions& options) {
+  const auto start = robust_closed_form(pairs, options.solver, options.refinement.view_gate);
+  if (!start) return std::unexpected(start.error());
+  const auto refinement = refine_from_pairs(pairs, *start, options.refinement);
+  if (!refinement) return std::unexpected(refinement.error());
+  Validation validation;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (refinement->views[i].used) validation.pairs.push_back(pairs[i]);
+  }
+  HandEyeResult result = start_result(*refinement, validation.pairs);
+  result.closed_form = *start;
+  result.from_pairs = true;
+  const RefinementOptions quick = short_options(options, result);
+  validation.resolve = [&](const Indices& indices) {
+    std::vector<PosePair> some;
+    for (const std::size_t i : indices) some.push_back(validation.pairs[i]);
+    return refine_from_pairs(some, result.flange_T_camera, quick);
+  };
+  validate(validation, options, result);
+  return result;
+}
+
+}  // namespace firstlook

@@ -1,0 +1,103 @@
+#include "app/cli/calibrate_command.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "app/dataset/calibration_dataset.hpp"
+#include "app/report/hand_eye_json.hpp"
+#include "app/report/ros_files.hpp"
+
+namespace firstlook {
+namespace {
+
+enum ExitCode : int { kSolved = 0, kUsageError = 2, kDataError = 3, kRejected = 5 };
+
+int fail(const Error& error, int code) {
+  fmt::print(stderr, "{}\n", describe(error));
+  return code;
+}
+
+void narrate(const CalibrationDataset& data) {
+  for (const std::string& note : data.notes) fmt::print(stderr, "{}\n", note);
+  if (data.source == CalibrationSource::kPairs) {
+    fmt::print(stderr, "{} pose pairs\n", data.pairs.size());
+  } else {
+    fmt::print(stderr, "{} views of a board of {}x{} inner corners, {:.2f} mm squares, {}\n", data.views.size(),
+               data.board.inner_columns, data.board.inner_rows, data.board.square_size_m * 1e3,
+               data.source == CalibrationSource::kImages ? "corners found in the images" : "corners as given");
+  }
+}
+
+void narrate_views(const CalibrationDataset& data, const HandEyeResult& result) {
+  for (std::size_t i = 0; i < result.fits.size(); ++i) {
+    const ViewFit& fit = result.fits[i];
+    if (!fit.used) {
+      fmt::print(stderr, "  {}: left out, it contradicts the others\n", data.names[i]);
+    } else {
+      fmt::print(stderr, "  {}: {:.2f} px, arm off by {:.2f} mm {:.2f} mrad\n", data.names[i], fit.reprojection_rms_px,
+                 fit.arm_deviation.head<3>().norm() * 1e3, fit.arm_deviation.tail<3>().norm() * 1e3);
+    }
+  }
+}
+
+void print_text(const HandEyeResult& r) {
+  const Eigen::Vector3d t = r.flange_T_camera.translation() * 1e3;
+  const Eigen::Quaterniond q = r.flange_T_camera.quaternion();
+  const Eigen::Vector3d st = r.sigma_translation_m * 1e3, sr = r.sigma_rotation_rad * 1e3;
+  fmt::print("flange_T_camera  ({:.2f}, {:.2f}, {:.2f}) mm  quaternion xyzw ({:.6f}, {:.6f}, {:.6f}, {:.6f})\n", t.x(),
+             t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  fmt::print("sigma            ({:.2f}, {:.2f}, {:.2f}) mm  ({:.2f}, {:.2f}, {:.2f}) mrad\n", st.x(), st.y(), st.z(),
+             sr.x(), sr.y(), sr.z());
+  fmt::print("arm sigma        {:.2f} mm  {:.2f} mrad for each axis\n", r.arm_sigma.translation_m * 1e3,
+             r.arm_sigma.rotation_rad * 1e3);
+  if (!r.from_pairs) {
+    fmt::print("reprojection     {:.3f} px RMS in {} views; held out {:.2f} px\n", r.reprojection_rms_px, r.views,
+               r.holdout_rms_px);
+  }
+  fmt::print("held out         board seen off by {:.2f} mm RMS\n", r.holdout_rms_m * 1e3);
+  fmt::print("70 % subsets     spread {:.2f} mm  {:.2f} mrad RMS\n", r.subset_spread_m * 1e3,
+             r.subset_spread_rad * 1e3);
+  fmt::print("AX = XB          {:.3f} deg {:.2f} mm RMS over all pairs of views; {:.3f} deg {:.2f} mm consecutive\n",
+             r.ax_xb_all_pairs.rotation_rms_deg, r.ax_xb_all_pairs.translation_rms_mm,
+             r.ax_xb_consecutive.rotation_rms_deg, r.ax_xb_consecutive.translation_rms_mm);
+  fmt::print("usable distance  {:.2f} m\n", r.usable_distance_m);
+  fmt::print("verdict          {}\n", r.verdict == Verdict::kAccepted ? "accepted" : "rejected");
+  for (const std::string& reason : r.reasons) fmt::print("  {}\n", reason);
+}
+
+}  // namespace
+
+int run_calibrate_command(const CalibrateCommandOptions& options) {
+  HandEyeOptions hand_eye;
+  if (!options.solver.empty()) {
+    const auto solver = find_solver(options.solver);
+    if (!solver) {
+      fmt::print(stderr, "unknown solver '{}': park-martin or tsai-lenz\n", options.solver);
+      return kUsageError;
+    }
+    hand_eye.solver = *solver;
+  }
+  if (options.dataset.empty()) {
+    fmt::print(stderr, "no dataset named: firstlook calibrate --dataset DIR\n");
+    return kUsageError;
+  }
+  const auto data = read_calibration_dataset(options.dataset);
+  if (!data) return fail(data.error(), kDataError);
+  narrate(*data);
+  const auto result = data->source == CalibrationSource::kPairs
+                          ? calibrate_hand_eye_from_pairs(data->pairs, hand_eye)
+                          : calibrate_hand_eye(data->camera, data->board, data->views, hand_eye);
+  if (!result) return fail(result.error(), kDataError);
+  narrate_views(*data, *result);
+  if (options.json) {
+    fmt::print("{}\n", hand_eye_json(*result, kFlangeFrame, solver_name(hand_eye.solver)).dump(2));
+  } else {
+    print_text(*result);
+  }
+  std::fflush(stdout);
+  return options.strict && result->verdict == Verdict::kRejected ? kRejected : kSolved;
+}
+
+}  // namespace firstlook

@@ -1,0 +1,112 @@
+#include "app/cli/cli.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include "app/shell/job_settings.hpp"
+
+namespace firstlook {
+namespace {
+
+/// Options that more than one command has, before they become sources of the configuration.
+struct ConfigFlags {
+  std::string file, cell, seed, workers;
+
+  void add_to(CLI::App& app) {
+    app.add_option("--config", file, "configuration file (YAML)");
+    app.add_option("--cell", cell, "simulated cell: empty, workshop, machine_tending, cluttered, hall, random:SEED, or a file");
+    app.add_option("--seed", seed, "seed of all random numbers");
+    app.add_option("--workers", workers, "threads of one job (1 to 4); results do not depend on it");
+  }
+  [[nodiscard]] ConfigSources sources() const {
+    ConfigSources s;
+    if (!file.empty()) s.file = file;
+    s.environment = process_environment();
+    if (!cell.empty()) s.flags.push_back({"cell", "'" + cell + "'", "--cell"});
+    if (!seed.empty()) s.flags.push_back({"seed", seed, "--seed"});
+    if (!workers.empty()) s.flags.push_back({"workers", workers, "--workers"});
+    return s;
+  }
+};
+
+}  // namespace
+
+ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
+  CLI::App app{"firstlook calibrates the camera on a robot arm and maps its cell, moving only through space that it has "
+               "seen to be free."};
+  app.set_version_flag("--version", version_text());
+  app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::simple);
+
+  RunCommand run;
+  ConfigFlags run_flags;
+  std::string only = "everything", sensor = "full";
+  CLI::App* run_app = app.add_subcommand("run", "the whole job, in a simulated cell");
+  run_flags.add_to(*run_app);
+  run_app->add_option("--only", only, "a part of the job")
+      ->check(CLI::IsMember({"everything", "calibrate"}));
+  run_app->add_option("--sensor", sensor, "full pictures, or fast: coarser depth and projected corners")
+      ->check(CLI::IsMember({"full", "fast"}));
+  run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
+  run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
+  run_app->add_flag("--record", run.record, "keep the frames of the calibration as a dataset");
+  run_app->add_flag("--real-time", run.real_time, "at the pace of the clock instead of virtual time");
+  run_app->add_flag("--json", run.json, "print result.json on stdout at the end");
+
+  CalibrateCommandOptions calibrate;
+  CLI::App* calibrate_app = app.add_subcommand("calibrate", "hand-eye calibration from recorded data");
+  calibrate_app->add_option("--dataset", calibrate.dataset, "folder with board.yaml and poses.csv or pairs.csv")->required();
+  calibrate_app->add_option("--solver", calibrate.solver, "closed form that starts the refinement: park-martin, tsai-lenz");
+  calibrate_app->add_flag("--strict", calibrate.strict, "exit with 5 when the calibration is rejected");
+  calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");
+
+  MapCommandOptions map;
+  std::string map_dataset, map_out;
+  CLI::App* map_app = app.add_subcommand("map", "a map from recorded depth frames");
+  map_app->add_option("--dataset", map_dataset, "folder in TUM RGB-D layout")->required();
+  map_app->add_option("--resolution", map.resolution_m, "voxel size in metres")->capture_default_str();
+  map_app->add_option("--max-range", map.range_max_m, "rays are cut here, metres")->capture_default_str();
+  map_app->add_option("--out", map_out, "folder for collision_map.bt, map.ot and map.ply");
+  map_app->add_flag("--json", map.json, "print the counts as JSON");
+
+  ReplayCommand replay;
+  CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
+  replay_app->add_option("journal", replay.journal, "journal.flj of a run")->required();
+
+  CLI::App* states_app = app.add_subcommand("states", "the state machine as a Mermaid diagram");
+  ExplainCommand explain;
+  CLI::App* explain_app = app.add_subcommand("explain", "what a fault code means and what to do");
+  explain_app->add_option("code", explain.code, "E2005, or 2005")->required();
+
+  ConfigCommandOptions config;
+  ConfigFlags config_flags;
+  CLI::App* config_app = app.add_subcommand("config", "the configuration that a run would use, as commented YAML");
+  config_flags.add_to(*config_app);
+  config_app->add_flag("--defaults", config.defaults, "the defaults alone");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return {std::nullopt, code == 0 ? 0 : 2};
+  }
+  if (run_app->parsed()) {
+    run.sources = run_flags.sources();
+    run.cell_given = !run_flags.cell.empty();
+    run.scope = *find_scope(only);
+    run.fast_sensor = sensor == "fast";
+    return {run, 0};
+  }
+  if (calibrate_app->parsed()) return {calibrate, 0};
+  if (map_app->parsed()) {
+    map.dataset = map_dataset;
+    map.out = map_out;
+    return {map, 0};
+  }
+  if (replay_app->parsed()) return {replay, 0};
+  if (states_app->parsed()) return {StatesCommand{}, 0};
+  if (explain_app->parsed()) return {explain, 0};
+  config.sources = config_flags.sources();
+  return {config, 0};
+}
+
+}  // namespace firstlook

@@ -1,0 +1,185 @@
+/// Jobs of the calibration: the next view of the board, the solve, the verdict.
+#include <algorithm>
+
+#include "algorithms/vision/camera_model.hpp"
+#include "app/jobs/workbench.hpp"
+
+namespace firstlook {
+namespace {
+constexpr std::size_t kBootstrapViews = 4;  // three motions determine a rough transform, one more for a bad view
+}
+
+std::vector<CalibrationView> Workbench::views() const {
+  std::vector<CalibrationView> views;
+  views.reserve(observations_.size());
+  for (const Observation& o : observations_) views.push_back(o.view);
+  return views;
+}
+
+HandEyeOptions Workbench::solve_options() const {
+  HandEyeOptions options;
+  options.solver = find_solver(config_.calibration.solver).value_or(Solver::kParkMartin);
+  options.seed = static_cast<std::uint64_t>(config_.seed);
+  VerdictLimits& limits = options.limits;
+  limits.views_min = std::min(config_.calibration.views_min, 6);
+  limits.sigma_translation_max_m = config_.calibration.sigma_max_mm * 1e-3;
+  limits.sigma_rotation_max_rad = config_.calibration.sigma_max_mrad * 1e-3;
+  limits.holdout_rms_max_px = config_.calibration.holdout_rms_max_px;
+  limits.subset_spread_max_m = config_.calibration.subset_spread_max_mm * 1e-3;
+  limits.voxel_size_m = config_.map.resolution_m;
+  limits.tolerance_m = config_.calibration.gripper_tolerance_m;
+  limits.usable_distance_min_m = config_.calibration.usable_distance_min_m;
+  return options;
+}
+
+/// What the views taken so far say about hand-eye and board; empty until they determine it.
+std::optional<ViewDesignModel> Workbench::rough_model() const {
+  if (observations_.size() < kBootstrapViews) return std::nullopt;
+  std::vector<PosePair> pairs;
+  for (const Observation& o : observations_) pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board});
+  const auto rough = solve_closed_form(pairs);
+  if (!rough) return std::nullopt;
+  ViewDesignModel model;
+  model.camera = color_.intrinsics();
+  model.board = board_;
+  model.flange_T_camera = *rough;
+  model.base_T_board = mean_board_pose(pairs, *rough);
+  model.corner_sigma_px = config_.calibration.corner_sigma_px;
+  model.arm_sigma = {config_.calibration.robot_sigma_mm * 1e-3, config_.calibration.robot_sigma_mrad * 1e-3};
+  RefinementOptions options;
+  options.corner_sigma_px = model.corner_sigma_px;
+  options.arm_sigma = model.arm_sigma;
+  options.rounds_max = 1;
+  const auto taken = views();
+  if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) {
+    model.flange_T_camera = refined->flange_T_camera;
+    model.base_T_board = refined->base_T_board;
+  }
+  return model;
+}
+
+CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
+  CalibrationViewResult result;
+  const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
+  if (bootstrap_.empty()) {
+    auto views = bootstrap_views(arm_, envelope_body_, space, blind_terms_.clearance(), here.at_rad);
+    if (!views) return result;
+    bootstrap_.push_back(here.at_rad);  // where the board was seen is a view, too
+    for (const JointVector& q : *views) {
+      if (!bootstrap_.full()) bootstrap_.push_back(q);
+    }
+  }
+  while (bootstrap_next_ < bootstrap_.size()) {
+    const JointVector target = bootstrap_[bootstrap_next_++];
+    const auto path = planner_.plan(arm_, envelope_body_, space, blind_terms_.clearance(), here.at_rad, target,
+                                    {.seed = here.step + 1, .limits = limits_});
+    if (!path) continue;
+    result.found = true;
+    result.path = route_of(*path, envelope_body_);
+    return result;
+  }
+  return result;
+}
+
+CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
+  const auto model = rough_model();
+  if (!model) return next_bootstrap_view(here);
+  Matrix12d information = prior_information();
+  std::vector<JointVector> taken;
+  for (const Observation& o : observations_) {
+    information += view_information(*model, o.view.base_T_flange);
+    taken.push_back(o.joints_rad);
+  }
+  CalibrationViewOptions options;
+  options.seed = static_cast<std::uint64_t>(config_.seed);
+  options.step = here.step;
+  options.speed = limits_;
+  const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
+  const Clearance clearance = blind_terms_.clearance();
+  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, *model, information, taken};
+  CalibrationViewResult result;
+  const PredictedSigma sigma = predicted_sigma(predicted_covariance(information));
+  result.sigma_mm = 1000 * sigma.translation_m;
+  result.sigma_mrad = 1000 * sigma.rotation_rad;
+  result.target_met = result.sigma_mm <= config_.calibration.target_sigma_mm &&
+                      result.sigma_mrad <= config_.calibration.target_sigma_mrad;
+  const auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
+  if (choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen) {
+    result.found = true;
+    result.path = route_of(choice->path, envelope_body_);
+  } else if (observations_.size() < static_cast<std::size_t>(config_.calibration.views_min)) {
+    return next_bootstrap_view(here);  // few places see the board: take what there is
+  }
+  return result;
+}
+
+SolveResult Workbench::solve() {
+  SolveResult result;
+  const auto solved = solve_hand_eye(color_.intrinsics(), board_, views(), solve_options());
+  if (!solved) {
+    result.fault = solved.error().fault;
+    return result;
+  }
+  hand_eye_ = *solved;
+  result.solved = true;
+  const Eigen::Vector3d t = solved->flange_T_camera.translation();
+  const Eigen::Quaterniond q = solved->flange_T_camera.quaternion();
+  result.translation_m = {t.x(), t.y(), t.z()};
+  result.quaternion_xyzw = {q.x(), q.y(), q.z(), q.w()};
+  result.sigma_mm = 1000 * solved->sigma_translation_m.norm();
+  result.sigma_mrad = 1000 * solved->sigma_rotation_rad.norm();
+  result.reprojection_rms_px = solved->reprojection_rms_px;
+  return result;
+}
+
+ValidateResult Workbench::validate() {
+  ValidateResult result;
+  if (!hand_eye_) return result;
+  validate_hand_eye(color_.intrinsics(), board_, views(), solve_options(), *hand_eye_);
+  result.accepted = hand_eye_->verdict == Verdict::kAccepted;
+  result.holdout_rms_px = hand_eye_->holdout_rms_px;
+  result.usable_distance_m = hand_eye_->usable_distance_m;
+  if (result.accepted) {
+    begin_mapping();
+    result.clearance_m = mapping_terms_->voxels_m;
+  }
+  return result;
+}
+
+std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
+  std::vector<CalibrationViewRecord> records;
+  const CameraIntrinsics& camera = color_.intrinsics();
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    const Observation& o = observations_[i];
+    CalibrationViewRecord r;
+    r.time_s = o.time_s;
+    r.joints_rad = o.joints_rad;
+    r.base_T_flange = o.view.base_T_flange;
+    r.detected_px = o.view.corners_px;
+    r.rms_px = o.residual_rms_px;
+    if (hand_eye_) {
+      const auto camera_T_board =
+          (o.view.base_T_flange * hand_eye_->flange_T_camera).inverse() * hand_eye_->base_T_board;
+      for (int c = 0; c < board_.corners(); ++c) {
+        const auto pixel = project(camera, camera_T_board * board_.corner(c));
+        r.reprojected_px.push_back(pixel.value_or(Eigen::Vector2d(-1, -1)));
+      }
+      double sum = 0;
+      for (std::size_t c = 0; c < r.detected_px.size(); ++c) {
+        sum += (r.detected_px[c] - r.reprojected_px[c]).squaredNorm();
+      }
+      r.rms_px = std::sqrt(sum / (2.0 * static_cast<double>(r.detected_px.size())));
+    }
+    const std::size_t pixels = gray_.size();
+    if ((i + 1) * pixels <= pictures_.size()) {
+      const auto from = pictures_.items().subspan(i * pixels, pixels);
+      if (std::any_of(from.begin(), from.end(), [](std::uint8_t v) { return v != 0; })) {
+        r.picture = {camera.width, camera.height, {from.begin(), from.end()}};
+      }
+    }
+    records.push_back(std::move(r));
+  }
+  return records;
+}
+
+}  // namespace firstlook

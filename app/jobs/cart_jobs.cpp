@@ -1,0 +1,85 @@
+#include "app/jobs/cart_jobs.hpp"
+
+#include <exception>
+
+#include "platform/journal/archive.hpp"
+
+namespace firstlook {
+namespace {
+
+template <typename Arguments, typename Work>
+std::size_t run(const JobRequest& request, std::span<std::byte> bytes, std::uint64_t& failed, Work work) noexcept {
+  Arguments arguments;
+  ENSURE(7101, unpack(request.bytes(), arguments));
+  using JobResult = decltype(work(arguments));
+  JobResult result;
+  try {
+    result = work(arguments);
+  } catch (const std::exception&) {  // heap allowance used up, or a library's complaint about its input
+    ++failed;
+    result = JobResult{};
+  }
+  const std::size_t size = pack(result, bytes);
+  ENSURE(7102, size > 0);
+  return size;
+}
+
+}  // namespace
+
+std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> result) noexcept {
+  Workbench& b = bench_;
+  switch (static_cast<JobKind>(request.kind)) {
+    case JobKind::kLocateViews:
+      return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.locate_views(a); });
+    case JobKind::kIdentifyMotions:
+      return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.identify_motions(a); });
+    case JobKind::kPlan:
+      return run<PlanArguments>(request, result, failed_, [&b](const PlanArguments& a) { return b.plan(a); });
+    case JobKind::kCertifyPath:
+      return run<PlanArguments>(request, result, failed_, [&b](const PlanArguments& a) { return b.certify_path(a); });
+    case JobKind::kDetectBoard:
+      return run<DetectArguments>(request, result, failed_,
+                                  [&b](const DetectArguments& a) { return b.detect_board(a); });
+    case JobKind::kNextCalibrationView:
+      return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.next_calibration_view(a); });
+    case JobKind::kSolve:
+      return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.solve(); });
+    case JobKind::kValidate:
+      return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.validate(); });
+    case JobKind::kIntegrate:
+      return run<IntegrateArguments>(request, result, failed_,
+                                     [&b](const IntegrateArguments& a) { return b.integrate(a); });
+    case JobKind::kNextSweepView:
+      return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.next_sweep_view(a); });
+    case JobKind::kNextView:
+      return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.next_view(a); });
+    case JobKind::kCheckBoard:
+      return run<DetectArguments>(request, result, failed_,
+                                  [&b](const DetectArguments& a) { return b.check_board(a); });
+    case JobKind::kSummarize:
+      return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.summarize(); });
+  }
+  ENSURE(7103, false);
+  return 0;
+}
+
+Duration virtual_duration(JobKind kind) {
+  switch (kind) {
+    case JobKind::kLocateViews:
+    case JobKind::kIdentifyMotions: return milliseconds(20);
+    case JobKind::kPlan: return milliseconds(50);
+    case JobKind::kCertifyPath: return milliseconds(5);
+    case JobKind::kDetectBoard:
+    case JobKind::kCheckBoard: return milliseconds(150);
+    case JobKind::kNextCalibrationView: return milliseconds(500);
+    case JobKind::kSolve: return milliseconds(300);
+    case JobKind::kValidate: return milliseconds(1500);
+    case JobKind::kIntegrate: return milliseconds(80);
+    case JobKind::kNextSweepView: return milliseconds(100);
+    case JobKind::kNextView: return milliseconds(500);
+    case JobKind::kSummarize: return milliseconds(500);
+  }
+  return milliseconds(100);
+}
+
+}  // namespace firstlook

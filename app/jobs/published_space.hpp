@@ -1,0 +1,76 @@
+/// The free space as the last completed job left it, for those who look at it from the loop thread: the guardian, and
+/// whoever audits the motion.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "algorithms/motion/body.hpp"
+#include "algorithms/motion/free_space.hpp"
+#include "algorithms/motion/guardian.hpp"
+
+namespace firstlook {
+
+class PublishedSpace {
+ public:
+  PublishedSpace(const GridGeometry& geometry, double distance_max_m)
+      : next_field_(geometry, distance_max_m),
+        field_(geometry, distance_max_m),
+        next_free_(geometry.count(), 0),
+        free_(geometry.count(), 0) {}
+
+  /// From a job: what will be seen from the next take() on. `field` may be null: only the zone counts.
+  void publish(const FreeSpace& space, const Body& body, const Clearance& guardian_clearance,
+               std::span<const std::uint8_t> free_mask) {
+    const std::lock_guard lock(mutex_);
+    has_field_ = space.field != nullptr;
+    if (has_field_) next_field_ = *space.field;
+    next_space_ = space;
+    next_body_ = body;
+    next_clearance_ = guardian_clearance;
+    if (!free_mask.empty()) std::copy(free_mask.begin(), free_mask.end(), next_free_.begin());
+    fresh_ = true;
+  }
+  /// From the loop thread, when a job's completion is dispatched.
+  void take() {
+    const std::lock_guard lock(mutex_);
+    if (!fresh_) return;
+    fresh_ = false;
+    field_ = next_field_;
+    space_ = next_space_;
+    space_.field = has_field_ ? &field_ : nullptr;
+    mapped_ = has_field_;
+    body_ = next_body_;
+    clearance_ = next_clearance_;
+    free_ = next_free_;
+  }
+
+  /// The guardian's verdict on a configuration; loop thread.
+  [[nodiscard]] GuardianVerdict judge(const ArmModel& arm, const JointVector& q_rad) const {
+    return check(arm, body_, space_, clearance_, q_rad, std::nullopt);
+  }
+  /// Whether there is a map; before, the safe zone's cylinder is all that is free. Loop thread.
+  [[nodiscard]] bool mapped() const { return mapped_; }
+  [[nodiscard]] const GridGeometry& geometry() const { return field_.geometry(); }
+  [[nodiscard]] bool free_for_motion(std::size_t voxel) const { return free_[voxel] != 0; }
+  [[nodiscard]] const FreeSpace& space() const { return space_; }
+  /// What the guardian requires at least, whatever limits the body: its margins are beyond this.
+  [[nodiscard]] double required_m() const { return std::min(clearance_.voxels_m, clearance_.surface_m); }
+
+ private:
+  std::mutex mutex_;
+  bool fresh_ = false;
+  bool has_field_ = false;
+  bool mapped_ = false;
+  DistanceField next_field_, field_;
+  FreeSpace next_space_, space_;
+  Body next_body_, body_;
+  Clearance next_clearance_, clearance_;
+  std::vector<std::uint8_t> next_free_, free_;
+};
+
+}  // namespace firstlook

@@ -1,0 +1,197 @@
+#include "app/jobs/workbench.hpp"
+
+#include <algorithm>
+
+#include "algorithms/mapping/map_image.hpp"
+#include "algorithms/mapping/reach_zone.hpp"
+
+namespace firstlook {
+namespace {
+constexpr double kFieldMax_m = 0.6;        // farther is as good as free: the largest body radius and clearance are below
+constexpr double kZoneMargin_m = 0.10;     // stopping distance and a voxel, as the reach zone wants
+constexpr std::size_t kViewRecordsMax = 512;
+
+DepthSensor sensor_of(const Config& config, const hal::DepthCamera& camera) {
+  return {camera.intrinsics(), config.depth.range_min_m, config.depth.range_max_m, config.depth.range_trusted_m,
+          config.depth.noise_at_1m_m};
+}
+
+Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+ClearanceInputs clearance_inputs(const Config& config) {
+  ClearanceInputs in;
+  in.voxel_m = config.map.resolution_m;
+  in.sigma_depth_at_1m_m = config.depth.noise_at_1m_m;
+  in.sigma_tracking_m = config.clearance.tracking_sigma_m;
+  in.payload_sag_m = config.clearance.sag_m;
+  in.speed_m_s = config.arm.speed_max_m_s;
+  in.reaction_s = config.clearance.reaction_time_s;
+  in.deceleration_m_s2 = config.clearance.deceleration_m_s2;
+  return in;
+}
+}  // namespace
+
+Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const CellFacts& facts,
+                                                   hal::ColorCamera& color, hal::DepthCamera& depth,
+                                                   WorkerPool& workers) {
+  const auto arm = find_arm_model(config.arm.model);
+  if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
+  const GridGeometry geometry =
+      GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
+  const std::size_t needed = VoxelMap::required_bytes(geometry) + 2 * geometry.count();
+  if (needed > memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) {
+    return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m need {:.1f} MiB, the budget holds {:.1f} MiB",
+                   geometry.size.x(), geometry.size.y(), geometry.size.z(), geometry.resolution_m,
+                   static_cast<double>(needed) / memory::kMiB,
+                   static_cast<double>(memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) / memory::kMiB);
+  }
+  auto bench =
+      std::unique_ptr<Workbench>(new Workbench(config, facts, *arm, color, depth, workers, geometry));
+  if (const Status taken = bench->take_memory(); !taken) return std::unexpected(taken.error());
+  return bench;
+}
+
+Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmModel& arm, hal::ColorCamera& color,
+                     hal::DepthCamera& depth, WorkerPool& workers, const GridGeometry& geometry)
+    : config_(config),
+      facts_(facts),
+      arm_(arm),
+      color_(color),
+      depth_(depth),
+      workers_(workers),
+      board_{config.board.inner_columns, config.board.inner_rows, config.board.square_size_m},
+      limits_{config.arm.speed_max_m_s, config.arm.speed_max_rad_s, config.arm.acceleration_rad_s2},
+      zone_cylinder_{config.safe_zone.radius_m, config.safe_zone.height_m, config.cart.top_m},
+      envelope_body_(body_with_envelope(arm, config.camera_envelope_radius_m)),
+      camera_body_(envelope_body_),
+      blind_terms_(required_clearance(clearance_inputs(config))),
+      map_(geometry),
+      inserter_(geometry, sensor_of(config, depth)),
+      field_(geometry, kFieldMax_m),
+      free_mask_(geometry.count(), 0),
+      zone_(geometry.count(), 0),
+      chooser_(geometry, sensor_of(config, depth), config.explore.candidates, workers.workers(),
+               config.explore.certificate_samples),
+      published_(geometry, kFieldMax_m) {
+  map_.set_safe_zone(zone_cylinder_);
+  for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});
+  mapping_views_.reserve(kViewRecordsMax);
+  observations_.reserve(static_cast<std::size_t>(config.calibration.views_max) + 1);
+  map_.free_mask(0, config.map.free_max_age_s, free_mask_);
+  published_.publish(space_of(MotionPhase::kBeforeCalibration), envelope_body_,
+                     guardian_clearance(blind_terms_.clearance(), blind_terms_.stopping_m), free_mask_);
+  published_.take();
+}
+
+Status Workbench::take_memory() {
+  const GridGeometry& g = map_.geometry();
+  const auto account = [this](memory::Pool pool, std::size_t bytes) -> Status {
+    auto share = memory::PoolShare::take(pool, bytes);
+    if (!share) return std::unexpected(share.error());
+    shares_.push_back(std::move(*share));
+    return {};
+  };
+  const DepthSensor& sensor = inserter_.sensor();
+  const std::size_t snapshot = DistanceField::required_bytes(g) + g.count();
+  for (const auto& [pool, bytes] : {
+           std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 2 * g.count()},
+           std::pair{memory::Pool::kDistanceField,
+                     DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
+           std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
+           std::pair{memory::Pool::kViewCandidates,
+                     ViewChooser::required_bytes(g, config_.explore.candidates, 2, config_.explore.certificate_samples)},
+       }) {
+    if (const Status status = account(pool, bytes); !status) return status;
+  }
+  const auto color_pixels = static_cast<std::size_t>(color_.intrinsics().width) *
+                            static_cast<std::size_t>(color_.intrinsics().height);
+  const auto depth_pixels = static_cast<std::size_t>(depth_.intrinsics().width) *
+                            static_cast<std::size_t>(depth_.intrinsics().height);
+  auto gray = memory::PoolBuffer<std::uint8_t>::make(memory::Pool::kColorFrames, color_pixels);
+  if (!gray) return std::unexpected(gray.error());
+  gray_ = std::move(*gray);
+  auto raw = memory::PoolBuffer<std::uint16_t>::make(memory::Pool::kDepthFrames, depth_pixels);
+  if (!raw) return std::unexpected(raw.error());
+  depth_pixels_ = std::move(*raw);
+  auto self = memory::PoolBuffer<float>::make(memory::Pool::kDistanceField, depth_pixels);
+  if (!self) return std::unexpected(self.error());
+  self_depth_ = std::move(*self);
+  auto pictures = memory::PoolBuffer<std::uint8_t>::make(
+      memory::Pool::kReportBuffers, color_pixels * static_cast<std::size_t>(config_.calibration.views_max));
+  if (!pictures) return std::unexpected(pictures.error());
+  pictures_ = std::move(*pictures);
+  return {};
+}
+
+const Body& Workbench::body_of(MotionPhase phase) const {
+  return phase == MotionPhase::kMapping ? camera_body_ : envelope_body_;
+}
+
+FreeSpace Workbench::space_of(MotionPhase phase) const {
+  FreeSpace space;
+  space.field = phase == MotionPhase::kMapping ? &field_ : nullptr;
+  space.zone = zone_cylinder_;
+  space.zone_intact = zone_intact_;
+  for (const Config::KeepOut& box : config_.keep_out) {
+    space.keep_out_boxes.push_back({vector_of(box.low_m), vector_of(box.high_m)});
+  }
+  return space;
+}
+
+Clearance Workbench::clearance_of(MotionPhase phase) const {
+  return phase == MotionPhase::kMapping && mapping_terms_ ? mapping_terms_->clearance() : blind_terms_.clearance();
+}
+
+ViewTiming Workbench::timing() const {
+  ViewTiming timing;
+  timing.limits = limits_;
+  timing.settle_s = config_.calibration.settle_time_s;
+  return timing;
+}
+
+/// After the calibration is accepted: its clearance, the body with the camera where it is, and the zone to be mapped.
+void Workbench::begin_mapping() {
+  ClearanceInputs in = clearance_inputs(config_);
+  in.sigma_hand_eye_m = hand_eye_->sigma_translation_m.maxCoeff();
+  in.sigma_hand_eye_rad = hand_eye_->sigma_rotation_rad.maxCoeff();
+  mapping_terms_ = required_clearance(in);
+  camera_body_ = body_with_camera(arm_, hand_eye_->flange_T_camera);
+  mark_reach_zone(map_.geometry(), arm_, camera_body_.capsules, kZoneMargin_m, config_.map.low_m[2], zone_);
+  unknown_before_ = zone_counts().unknown;
+  rebuild_free_space(last_stamp_s_);
+}
+
+VoxelCounts Workbench::zone_counts() const {
+  VoxelCounts counts;
+  for (std::size_t i = 0; i < zone_.size(); ++i) {
+    if (zone_[i] == 0) continue;
+    switch (map_.voxel_class(i)) {
+      case VoxelClass::kUnknown: ++counts.unknown; break;
+      case VoxelClass::kFree: ++counts.free; break;
+      case VoxelClass::kOccupied: ++counts.occupied; break;
+    }
+  }
+  return counts;
+}
+
+void Workbench::rebuild_free_space(double now_s) {
+  map_.free_mask(now_s, config_.map.free_max_age_s, free_mask_);
+  field_.rebuild(free_mask_);
+  if (!mapping_terms_) return;
+  mapping_space_ = space_of(MotionPhase::kMapping);
+  mapping_clearance_ = mapping_terms_->clearance();
+  published_.publish(mapping_space_, camera_body_,
+                     guardian_clearance(mapping_terms_->clearance(), mapping_terms_->stopping_m), free_mask_);
+}
+
+void Workbench::forget_known_free() {
+  map_.forget_known_free();
+  rebuild_free_space(last_stamp_s_);
+}
+
+ViewContext Workbench::context() const {
+  return {arm_,  camera_body_, mapping_space_, mapping_clearance_,
+          map_, zone_,        hand_eye_->flange_T_camera * facts_.camera_T_depth};
+}
+
+}  // namespace firstlook

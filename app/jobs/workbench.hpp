@@ -1,0 +1,166 @@
+/// What the jobs work with: the arm, the observations of the board, the calibration, the map. Jobs of the map strand run
+/// one after the other, so nothing here is locked; what the loop thread needs is published (published_space.hpp).
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "algorithms/calibration/verdict.hpp"
+#include "algorithms/calibration/view_design.hpp"
+#include "algorithms/kinematics/arm_model.hpp"
+#include "algorithms/kinematics/speed.hpp"
+#include "algorithms/mapping/distance_field.hpp"
+#include "algorithms/mapping/insertion.hpp"
+#include "algorithms/motion/body.hpp"
+#include "algorithms/motion/clearance.hpp"
+#include "algorithms/motion/planner.hpp"
+#include "algorithms/view_planning/calibration_views.hpp"
+#include "algorithms/view_planning/explore.hpp"
+#include "algorithms/view_planning/remaining_reason.hpp"
+#include "algorithms/view_planning/sweep.hpp"
+#include "algorithms/vision/board_pose.hpp"
+#include "app/config/config.hpp"
+#include "app/jobs/published_space.hpp"
+#include "app/machine/job_types.hpp"
+#include "app/report/run_record.hpp"
+#include "hal/api/cameras.hpp"
+#include "platform/loop/worker_pool.hpp"
+#include "platform/memory/pool_buffer.hpp"
+
+namespace firstlook {
+
+/// What the program knows of its cell besides the configuration: the integrator's data sheet.
+struct CellFacts {
+  JointVector start_rad;                    ///< where the sweep turns around, and where the job parks
+  Transform<Camera, Depth> camera_T_depth;  ///< factory transform
+};
+
+/// One stop at which the board was seen for the calibration.
+struct Observation {
+  JointVector joints_rad;
+  double time_s = 0;
+  CalibrationView view;
+  BoardPose pose;
+  double residual_rms_px = 0;
+};
+
+class Workbench {
+ public:
+  /// Takes all memory that the job needs. Errors: kMapTooLarge and kOutOfMemory with the numbers, kConfigBadValue.
+  [[nodiscard]] static Result<std::unique_ptr<Workbench>> make(const Config& config, const CellFacts& facts,
+                                                               hal::ColorCamera& color, hal::DepthCamera& depth,
+                                                               WorkerPool& workers);
+
+  // ---- the jobs, one for each JobKind. `now_s` is the loop's time of the request.
+  [[nodiscard]] ViewList locate_views(const FromHere& here);
+  [[nodiscard]] ViewList identify_motions(const FromHere& here);
+  [[nodiscard]] PlanResult plan(const PlanArguments& arguments);
+  [[nodiscard]] PlanResult certify_path(const PlanArguments& arguments);
+  [[nodiscard]] DetectResult detect_board(const DetectArguments& arguments);
+  [[nodiscard]] CalibrationViewResult next_calibration_view(const FromHere& here);
+  [[nodiscard]] SolveResult solve();
+  [[nodiscard]] ValidateResult validate();
+  [[nodiscard]] IntegrateResult integrate(const IntegrateArguments& arguments);
+  [[nodiscard]] NextViewResult next_sweep_view(const FromHere& here);
+  [[nodiscard]] NextViewResult next_view(const FromHere& here);
+  [[nodiscard]] CheckBoardResult check_board(const DetectArguments& arguments);
+  [[nodiscard]] SummarizeResult summarize();
+
+  // ---- what the report is made of; after the loop has ended
+  [[nodiscard]] const std::optional<HandEyeResult>& hand_eye() const { return hand_eye_; }
+  [[nodiscard]] const std::optional<ClearanceTerms>& clearance_terms() const { return mapping_terms_; }
+  [[nodiscard]] std::vector<CalibrationViewRecord> calibration_records() const;
+  [[nodiscard]] const std::vector<MappingViewRecord>& mapping_views() const { return mapping_views_; }
+  [[nodiscard]] const std::vector<RemainingRecord>& remaining() const { return remaining_; }
+  [[nodiscard]] const VoxelMap& map() const { return map_; }
+  [[nodiscard]] std::span<const std::uint8_t> zone() const { return zone_; }
+  [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
+  [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
+  [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
+  [[nodiscard]] std::vector<Eigen::Vector3d> view_positions() const;
+  [[nodiscard]] std::vector<RgbPicture> map_pictures() const;
+  [[nodiscard]] const ArmModel& arm() const { return arm_; }
+  [[nodiscard]] PublishedSpace& published() { return published_; }
+  [[nodiscard]] double last_stamp_s() const { return last_stamp_s_; }
+
+  /// Safety rule 7: nothing is known free until it is seen again.
+  void forget_known_free();
+
+ private:
+  Workbench(const Config& config, const CellFacts& facts, const ArmModel& arm, hal::ColorCamera& color,
+            hal::DepthCamera& depth, WorkerPool& workers, const GridGeometry& geometry);
+  [[nodiscard]] Status take_memory();
+
+  [[nodiscard]] const Body& body_of(MotionPhase phase) const;
+  [[nodiscard]] FreeSpace space_of(MotionPhase phase) const;
+  [[nodiscard]] Clearance clearance_of(MotionPhase phase) const;
+  [[nodiscard]] Route route_of(const Path& path, const Body& body) const;
+  [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, MotionPhase phase,
+                                        double* margin_m = nullptr) const;
+  [[nodiscard]] ViewContext context() const;
+  [[nodiscard]] ViewTiming timing() const;
+
+  [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
+  [[nodiscard]] Result<CornerSet> averaged_corners(const DetectArguments& arguments);
+  void keep_picture(std::size_t observation);
+  [[nodiscard]] std::optional<ViewDesignModel> rough_model() const;
+  [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
+  [[nodiscard]] HandEyeOptions solve_options() const;
+  [[nodiscard]] std::vector<CalibrationView> views() const;
+  void begin_mapping();
+  void rebuild_free_space(double now_s);
+  void note_view(const IntegrateArguments& arguments, std::uint64_t gained);
+  [[nodiscard]] VoxelCounts zone_counts() const;
+  void take_choice(NextViewResult& result, const Path& path, double gain);
+
+  Config config_;
+  CellFacts facts_;
+  ArmModel arm_;
+  hal::ColorCamera& color_;
+  hal::DepthCamera& depth_;
+  WorkerPool& workers_;
+  BoardSpec board_;
+  SpeedLimits limits_;
+  SafeZone zone_cylinder_;
+
+  Planner planner_;
+  Body envelope_body_;
+  Body camera_body_;
+  ClearanceTerms blind_terms_;                    ///< before the calibration: no measurement is involved
+  std::optional<ClearanceTerms> mapping_terms_;
+
+  memory::PoolBuffer<std::uint8_t> gray_;
+  memory::PoolBuffer<std::uint16_t> depth_pixels_;
+  memory::PoolBuffer<float> self_depth_;
+  memory::PoolBuffer<std::uint8_t> pictures_;     ///< one for each observation
+  std::vector<memory::PoolShare> shares_;
+
+  std::optional<BoardPose> identify_reference_;
+  std::vector<Observation> observations_;
+  Turns bootstrap_;
+  std::size_t bootstrap_next_ = 0;
+  std::optional<HandEyeResult> hand_eye_;
+
+  VoxelMap map_;
+  Inserter inserter_;
+  DistanceField field_;
+  std::vector<std::uint8_t> free_mask_;
+  std::vector<std::uint8_t> zone_;
+  bool zone_intact_ = true;
+  FreeSpace mapping_space_;      ///< as rebuilt last
+  Clearance mapping_clearance_;
+  ViewChooser chooser_;
+  std::optional<SweepProgress> sweep_;
+  PublishedSpace published_;
+  double last_stamp_s_ = 0;
+  bool sweeping_ = true;
+  double expected_gain_ = 0;
+  std::uint64_t frames_integrated_ = 0;
+  std::uint64_t frames_dropped_ = 0;
+  std::uint64_t unknown_before_ = 0;
+  std::vector<MappingViewRecord> mapping_views_;
+  std::vector<RemainingRecord> remaining_;
+};
+
+}  // namespace firstlook

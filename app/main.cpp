@@ -1,0 +1,191 @@
+/// firstlook: the only file that names concrete devices.
+#include <cstdio>
+#include <string>
+
+#include "app/cli/cli.hpp"
+#include "app/machine/state_table.hpp"
+#include "app/report/result_json.hpp"
+#include "app/report/run_files.hpp"
+#include "app/shell/calibration_recording.hpp"
+#include "app/shell/cart.hpp"
+#include "app/shell/replay.hpp"
+#include "hal/sim/simulated_cell.hpp"
+#include "platform/linux/process.hpp"
+#include "platform/linux/terminal.hpp"
+
+namespace firstlook {
+namespace {
+
+enum ExitCode { kDone = 0, kUsage = 2, kData = 3, kDevice = 4, kRejected = 5, kStopped = 6, kInternal = 70 };
+
+int exit_code_of(const Error& error) {
+  switch (error.fault) {
+    case Fault::kUsage: return kUsage;
+    case Fault::kDeviceMissing: return kDevice;
+    case Fault::kInternal: return kInternal;
+    default: return kData;
+  }
+}
+
+int exit_code_of(const Ending& ending) {
+  switch (ending.outcome) {
+    case Outcome::kDone: return kDone;
+    case Outcome::kCalibrationRejected: return kRejected;
+    case Outcome::kSafelyStopped: return kStopped;
+    case Outcome::kFaulted: return ending.fault == Fault::kDeviceMissing ? kDevice : kInternal;
+  }
+  return kInternal;
+}
+
+int fail(const Error& error) {
+  std::fprintf(stderr, "firstlook: %s\n", describe(error).c_str());
+  return exit_code_of(error);
+}
+
+/// What the program holds for free, as the grader of the simulated cell asks for it.
+class KnownFree final : public sim::KnownFreeView {
+ public:
+  explicit KnownFree(const PublishedSpace& space) : space_(space) {}
+  [[nodiscard]] const GridGeometry& geometry() const override { return space_.geometry(); }
+  [[nodiscard]] bool free_for_motion(std::size_t voxel) const override { return space_.free_for_motion(voxel); }
+  [[nodiscard]] bool zone_intact() const override { return space_.space().zone_intact; }
+
+ private:
+  const PublishedSpace& space_;
+};
+
+/// The configuration of a simulated cell: what its integrator would have typed in.
+void describe_cell(const sim::CellDescription& cell, Config& config) {
+  config.arm.model = cell.arm_model;
+  config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
+  config.cart.top_m = cell.cart_top_m;
+  config.board = {"checkerboard", cell.board_columns, cell.board_rows, cell.board_square_m};
+  config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
+  for (const sim::KeepOut& box : cell.keep_out) {
+    config.keep_out.push_back({{box.low_m.x(), box.low_m.y(), box.low_m.z()},
+                               {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
+  }
+  if (!config.parking_rad) config.parking_rad = cell.start_rad;
+}
+
+/// Grades the finished job against the truth of the simulated cell.
+TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
+  const Workbench& bench = cart.bench();
+  sim::FinalClaims claims;
+  if (bench.hand_eye()) {
+    claims.flange_T_camera = bench.hand_eye()->flange_T_camera;
+    claims.covariance = bench.hand_eye()->covariance;
+  }
+  if (bench.mapped()) claims.map = &bench.map();
+  claims.now_s = bench.last_stamp_s();
+  claims.free_max_age_s = config.map.free_max_age_s;
+  if (bench.clearance_terms()) claims.observable.clearance = bench.clearance_terms()->clearance();
+  claims.observable.sensor_range_min_m = config.depth.range_min_m;
+  claims.observable.sensor_range_max_m = config.depth.range_max_m;
+  claims.observable.sensor_range_trusted_m = config.depth.range_trusted_m;
+  claims.observable.zone_floor_m = config.map.low_m[2];
+  const sim::TruthFigures figures = grader.grade(claims);
+  return {figures.hand_eye_error_mm,      figures.hand_eye_error_mrad, figures.hand_eye_mahalanobis2, figures.contacts,
+          figures.unknown_entries,        figures.coverage_of_observable, figures.false_free_voxels};
+}
+
+void narrate_result(const RunRecord& record, const std::string& folder, Narrator& narrator) {
+  narrator.clear_progress();
+  narrator.line(fmt::format("{}: {}", name_of(record.outcome), record.reason));
+  if (record.hand_eye) {
+    const Eigen::Vector3d t = 1000 * record.hand_eye->flange_T_camera.translation();
+    const Eigen::Vector3d s = 1000 * record.hand_eye->sigma_translation_m;
+    narrator.line(fmt::format("hand-eye  x {:.2f} ± {:.2f}  y {:.2f} ± {:.2f}  z {:.2f} ± {:.2f} mm from {} views", t.x(),
+                              s.x(), t.y(), s.y(), t.z(), s.z(), record.hand_eye->views));
+  }
+  if (record.mapping) {
+    const VoxelCounts& v = record.mapping->voxels;
+    narrator.line(fmt::format("map       {} free, {} occupied, {} unknown voxels of {} m after {} views", v.free, v.occupied,
+                              v.unknown, record.mapping->resolution_m, record.mapping->views.size()));
+  }
+  if (record.truth) {
+    const TruthRecord& t = *record.truth;
+    narrator.line(fmt::format("truth     hand-eye off by {:.2f} mm, {:.2f} mrad; {} contacts, {} entries into unknown space; "
+                              "{:.1f} % of the observable voxels known",
+                              t.hand_eye_error_mm.value_or(0), t.hand_eye_error_mrad.value_or(0), t.contacts,
+                              t.unknown_entries, 100 * t.coverage_of_observable.value_or(0)));
+  }
+  narrator.line(fmt::format("report    {}/report.html", folder));
+}
+
+int run_job(const RunCommand& command) {
+  auto loaded = load_config(command.sources);
+  if (!loaded) return fail(loaded.error());
+  Config config = loaded->config;
+  Narrator narrator;
+  if (!command.cell_given && loaded->file.empty()) {
+    narrator.line(fmt::format("no configuration: running in the simulated cell {}", config.cell));
+  } else {
+    narrator.line(fmt::format("running in the simulated cell {}", config.cell));
+  }
+  const std::string folder =
+      command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
+  if (const Status prepared = prepare_run_folder(folder); !prepared) return fail(prepared.error());
+
+  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
+                                        command.faults, config.workers});
+  if (!cell) return fail(cell.error());
+  sim::SimulatedCell& world = **cell;
+  describe_cell(world.description(), config);
+
+  if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
+  const CartDevices devices{world.arm(), world.color(), world.depth(), world.pendant(), world.panel()};
+  const CellFacts facts{world.description().start_rad, world.description().camera_T_depth};
+  CartOptions options;
+  options.scope = command.scope;
+  options.real_time = command.real_time;
+  options.journal_path = folder + "/journal.flj";
+  auto cart = Cart::make(config, options, facts, devices, narrator);
+  if (!cart) return fail(cart.error());
+
+  const KnownFree known_free((*cart)->published());
+  world.grader().watch(&known_free);
+  catch_stop_signals();
+  const Status ran = (*cart)->run();
+  if (!ran) std::fprintf(stderr, "firstlook: %s\n", describe(ran.error()).c_str());
+
+  RunRecord record = (*cart)->record();
+  narrator.line("grading against the simulated cell's truth");
+  record.truth = grade(world.grader(), **cart, config);
+  world.grader().watch(nullptr);
+  record.provenance.sensor = command.fast_sensor ? "fast" : "full";
+  record.wall.folder = folder;
+  if (const Status written = write_run_files(folder, record, (*cart)->map_files()); !written) {
+    return fail(written.error());
+  }
+  if (command.record) {
+    if (const Status written = write_calibration_recording(folder + "/dataset", record, config); !written) {
+      return fail(written.error());
+    }
+  }
+  narrate_result(record, folder, narrator);
+  if (command.json) std::printf("%s", result_json(record).c_str());
+  return ran ? exit_code_of((*cart)->ending()) : kInternal;
+}
+
+struct Dispatch {
+  int operator()(const RunCommand& c) const { return run_job(c); }
+  int operator()(const CalibrateCommandOptions& c) const { return run_calibrate_command(c); }
+  int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
+  int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
+  int operator()(const StatesCommand&) const {
+    std::fputs(state_diagram().c_str(), stdout);
+    return kDone;
+  }
+  int operator()(const ExplainCommand& c) const { return run_explain_command(c.code); }
+  int operator()(const ConfigCommandOptions& c) const { return run_config_command(c); }
+};
+
+}  // namespace
+}  // namespace firstlook
+
+int main(int argc, char** argv) {
+  const auto parsed = firstlook::parse_command_line(argc, argv);
+  if (!parsed.command) return parsed.exit_code;
+  return std::visit(firstlook::Dispatch{}, *parsed.command);
+}

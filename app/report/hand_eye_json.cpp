@@ -1,0 +1,67 @@
+#include "app/report/hand_eye_json.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace firstlook {
+namespace {
+
+using nlohmann::json;
+
+template <typename Vector>
+json array_of(const Vector& vector) {
+  json array = json::array();
+  for (Eigen::Index i = 0; i < vector.size(); ++i) array.push_back(vector(i));
+  return array;
+}
+
+json transform_json(const Pose& pose) {
+  Eigen::Quaterniond q(pose.linear());
+  if (q.w() < 0) q.coeffs() = -q.coeffs();  // one of the two that mean the same
+  return {{"translation_m", array_of(Eigen::Vector3d(pose.translation()))}, {"quaternion_xyzw", array_of(q.coeffs())}};
+}
+
+json row_major(const Matrix6d& matrix) {
+  json array = json::array();
+  for (Eigen::Index row = 0; row < 6; ++row) {
+    for (Eigen::Index column = 0; column < 6; ++column) array.push_back(matrix(row, column));
+  }
+  return array;
+}
+
+json residual_json(const AxXbResidual& residual) {
+  return {{"rotation_rms_deg", residual.rotation_rms_deg}, {"translation_rms_mm", residual.translation_rms_mm}};
+}
+
+json only_with_corners(const HandEyeResult& result, double value) {
+  return result.from_pairs ? json(nullptr) : json(value);
+}
+
+}  // namespace
+
+json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, std::string_view solver) {
+  json object = transform_json(result.flange_T_camera.pose());
+  object["parent_link"] = parent_link;
+  object["sigma_translation_mm"] = array_of(Eigen::Vector3d(result.sigma_translation_m * 1e3));
+  object["sigma_rotation_mrad"] = array_of(Eigen::Vector3d(result.sigma_rotation_rad * 1e3));
+  object["covariance"] = row_major(result.covariance);
+  object["reprojection_rms_px"] = only_with_corners(result, result.reprojection_rms_px);
+  object["holdout_rms_px"] = only_with_corners(result, result.holdout_rms_px);
+  object["holdout_rms_mm"] = result.holdout_rms_m * 1e3;
+  object["views"] = result.views;
+  object["views_given"] = result.fits.size();
+  object["usable_distance_m"] = result.usable_distance_m;
+  object["verdict"] = result.verdict == Verdict::kAccepted ? "accepted" : "rejected";
+  object["reasons"] = result.reasons;
+  object["solver"] = solver;
+  object["closed_form"] = transform_json(result.closed_form.pose());
+  object["corner_sigma_px"] = only_with_corners(result, result.corner_sigma_px);
+  object["arm_sigma"] = {{"translation_mm", result.arm_sigma.translation_m * 1e3},
+                         {"rotation_mrad", result.arm_sigma.rotation_rad * 1e3}};
+  object["subset_spread"] = {{"translation_mm", result.subset_spread_m * 1e3},
+                             {"rotation_mrad", result.subset_spread_rad * 1e3}};
+  object["ax_xb_residual"] = {{"all_pairs", residual_json(result.ax_xb_all_pairs)},
+                              {"consecutive", residual_json(result.ax_xb_consecutive)}};
+  return object;
+}
+
+}  // namespace firstlook

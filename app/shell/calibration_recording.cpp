@@ -1,0 +1,53 @@
+#include "app/shell/calibration_recording.hpp"
+
+#include <vector>
+
+#include "app/report/png.hpp"
+#include "app/report/ros_files.hpp"
+#include "platform/linux/files.hpp"
+
+namespace firstlook {
+namespace {
+
+std::string pose_row(const std::string& image, const Transform<Base, Flange>& pose) {
+  const Eigen::Vector3d t = pose.translation();
+  const Eigen::Quaterniond q = pose.quaternion();
+  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}\n", image, t.x(), t.y(), t.z(), q.x(), q.y(),
+                     q.z(), q.w());
+}
+
+}  // namespace
+
+Status write_calibration_recording(const std::string& folder, const RunRecord& record, const Config& config) {
+  if (const Status made = make_directories(folder + "/images"); !made) return made;
+  std::string poses = "image,x,y,z,qx,qy,qz,qw\n";
+  std::string corners = "image,column,row,u_px,v_px\n";
+  bool pictures = true;
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (std::size_t i = 0; i < record.calibration_views.size(); ++i) {
+    const CalibrationViewRecord& view = record.calibration_views[i];
+    const std::string image = fmt::format("images/{:02}.png", i + 1);
+    poses += pose_row(image, view.base_T_flange);
+    pictures = pictures && view.picture.width > 0;
+    if (view.picture.width > 0) {
+      if (const Status s = write_file_atomically(folder + "/" + image, encode_png(view.picture)); !s) return s;
+    }
+    for (std::size_t c = 0; c < view.detected_px.size(); ++c) {
+      const auto columns = static_cast<std::size_t>(config.board.inner_columns);
+      corners += fmt::format("{},{},{},{:.6f},{:.6f}\n", image, c % columns, c / columns, view.detected_px[c].x(),
+                             view.detected_px[c].y());
+    }
+  }
+  texts.emplace_back("poses.csv", poses);
+  if (!pictures) texts.emplace_back("corners.csv", corners);
+  texts.emplace_back("board.yaml",
+                     fmt::format("type: checkerboard\ninner_columns: {}\ninner_rows: {}\nsquare_size_m: {}\n",
+                                 config.board.inner_columns, config.board.inner_rows, config.board.square_size_m));
+  if (record.intrinsics.width > 0) texts.emplace_back("camera_info.yaml", camera_info_yaml(record.intrinsics));
+  for (const auto& [name, text] : texts) {
+    if (const Status s = write_file_atomically(folder + "/" + name, text); !s) return s;
+  }
+  return {};
+}
+
+}  // namespace firstlook

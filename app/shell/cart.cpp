@@ -1,0 +1,260 @@
+#include "app/shell/cart.hpp"
+
+#include <algorithm>
+
+#include "algorithms/mapping/moveit_scene.hpp"
+#include "algorithms/mapping/octree_writer.hpp"
+#include "algorithms/mapping/ply_writer.hpp"
+#include "app/cli/small_commands.hpp"
+#include "app/config/load_config.hpp"
+#include "app/shell/event_codec.hpp"
+#include "app/shell/job_settings.hpp"
+#include "platform/linux/process.hpp"
+#include "platform/linux/wakeup.hpp"
+#include "platform/memory/allocation_guard.hpp"
+
+namespace firstlook {
+namespace {
+
+/// Phases that result.json names: the outermost states and those directly within Running.
+bool is_phase(StateId state) {
+  const StateId parent = state_row(state).parent;
+  return parent == StateId::kRunning || (parent == StateId::kNone && state != StateId::kRunning);
+}
+
+std::string reason_text(const Ending& ending) {
+  if (!ending.has_fault) return "the job is done";
+  const FaultRow& row = fault_row(ending.fault);
+  return fmt::format("E{} {}", static_cast<int>(ending.fault), row.text);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions& options, const CellFacts& facts,
+                                         const CartDevices& devices, Narrator& narrator) {
+  auto cart = std::unique_ptr<Cart>(new Cart(config, options, devices, narrator));
+  auto bench = Workbench::make(cart->config_, facts, devices.color, devices.depth, *cart->workers_);
+  if (!bench) return std::unexpected(bench.error());
+  cart->bench_ = std::move(*bench);
+  auto journal = JournalWriter::create_file(options.journal_path,
+                                            {version_text(), journal_config(cart->config_, options.scope)});
+  if (!journal) return std::unexpected(journal.error());
+  cart->journal_ = std::move(*journal);
+  cart->jobs_ = std::make_unique<CartJobs>(*cart->bench_);
+  cart->runner_ = std::make_unique<JobRunner>(*cart->jobs_, *cart->clock_,
+                                              options.real_time ? JobMode::kThreaded : JobMode::kVirtual);
+  cart->loop_.reset(new EventLoop(*cart->clock_, cart->journal_.get(), *cart, cart->timers_, *cart->runner_));
+  cart->arm_source_.emplace(devices.arm, cart->bench_->arm(), cart->bench_->published());
+  EventSource* const sources[] = {&cart->host_,         &*cart->arm_source_,      &cart->color_source_,
+                                  &cart->depth_source_, &cart->pendant_source_, &cart->panel_source_};
+  for (EventSource* source : sources) cart->loop_->add_source(*source);
+  cart->loop_->set_watchdog(&cart->watchdog_);
+  cart->machine_.emplace(machine_settings(cart->config_, options.scope), cart->decisions_);
+  return cart;
+}
+
+Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& devices, Narrator& narrator)
+    : config_(config),
+      options_(options),
+      devices_(devices),
+      narrator_(narrator),
+      workers_(std::make_unique<WorkerPool>(config.workers)),
+      color_source_(devices.color),
+      depth_source_(devices.depth),
+      pendant_source_(devices.pendant, OperatorDevice::kPendant),
+      panel_source_(devices.panel, OperatorDevice::kPanel),
+      decisions_(*this, this),
+      started_(utc_date_text()),
+      wall_start_s_(static_cast<double>(monotonic_ns()) * 1e-9) {
+  if (options.real_time) {
+    clock_ = std::make_unique<RealClock>();
+  } else {
+    clock_ = std::make_unique<VirtualClock>();
+  }
+}
+
+Cart::~Cart() = default;
+
+Status Cart::run() {
+  machine_->start(clock_->now());
+  memory::seal();
+  const Status status = loop_->run();
+  loop_allocations_ = memory::loop_allocations_after_seal();
+  memory::unseal();
+  if (loop_allocations_ > 0) memory::print_first_loop_allocation(2);
+  const Instant now = clock_->now();
+  if (!phases_.empty()) phases_.back().end = now;
+  if (const Status closed = journal_->close(now); !closed) return closed;
+  return status;
+}
+
+// ---- events
+
+void Cart::on_event(const Event& event) {
+  const auto machine_event = decode_event(event.kind, event.bytes());
+  if (!machine_event) return;  // the loop's own faults are in the journal
+  if (const auto* done = std::get_if<JobCompleted>(&*machine_event)) {
+    bench_->published().take();
+    if (done->number == awaited_job_) {
+      stall_s_ += (event.time - job_started_).seconds();
+      awaited_job_ = 0;
+    }
+  }
+  if (const auto* report = std::get_if<ArmReported>(&*machine_event)) watch_arm(*report);
+  machine_->on_event(event.time, *machine_event);
+}
+
+void Cart::watch_arm(const ArmReported& report) {
+  if (report.state.moving) {
+    min_clearance_m_ = std::min(min_clearance_m_, report.guardian_margin_m + bench_->published().required_m());
+  }
+}
+
+void Cart::end_of_turn(Instant now) {
+  if (stop_signal_received() || (!options_.real_time && now.seconds() > options_.virtual_time_max_s)) {
+    host_.ask_shutdown();
+  }
+  if (ended_) loop_->stop();
+}
+
+// ---- decisions
+
+void Cart::decision(DecisionKind kind, Instant now, std::span<const std::byte> bytes) {
+  journal_->decision(static_cast<std::uint16_t>(kind), now, bytes);
+}
+
+void Cart::state_entered(Instant now, StateId state) {
+  if (!is_phase(state)) return;
+  if (!phases_.empty()) phases_.back().end = now;
+  if (!phases_.full()) phases_.push_back({state, now, now});
+  std::array<char, 96> line;
+  const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s] {}", now.seconds(), state_row(state).name);
+  narrator_.line({line.data(), std::min(end.size, line.size())});
+}
+
+void Cart::move_arm(Instant now, const hal::Segment& segment) {
+  if (const Status moved = devices_.arm.move(segment, now); !moved) host_.refused(moved.error().fault);
+}
+
+void Cart::stop_arm(Instant now) { devices_.arm.stop(now); }
+
+void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<const std::byte> arguments) {
+  request_.kind = static_cast<std::uint16_t>(kind);
+  request_.number = number;
+  request_.on_map_strand = true;  // every job reads or writes the workbench
+  request_.virtual_duration = virtual_duration(kind);
+  request_.size = static_cast<std::uint32_t>(arguments.size());
+  std::copy(arguments.begin(), arguments.end(), request_.arguments.begin());
+  if (kind != JobKind::kIntegrate) {
+    awaited_job_ = number;
+    job_started_ = now;
+  }
+  // The machine has one awaited job and one integration at a time: the queue of eight cannot be full.
+  ENSURE(7221, runner_->submit(request_, now).has_value());
+}
+
+void Cart::set_timer(Instant, MachineTimer timer, Instant due) {
+  timers_.set(static_cast<std::uint32_t>(timer), due);
+}
+
+void Cart::cancel_timer(Instant, MachineTimer timer) { timers_.cancel(static_cast<std::uint32_t>(timer)); }
+
+void Cart::show(Instant now, std::string_view text) {
+  devices_.pendant.show(text);
+  std::array<char, 128> line;
+  const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s]   {}", now.seconds(), text);
+  const std::string_view shown(line.data(), std::min(end.size, line.size()));
+  if (narrator_.on_terminal()) {
+    narrator_.progress(shown);
+  } else {
+    narrator_.line(shown);
+  }
+}
+
+void Cart::light(Instant, hal::Light light) { devices_.panel.light(light); }
+
+void Cart::forget_known_free(Instant) { bench_->forget_known_free(); }
+
+void Cart::stop_recorded(Instant now, Fault cause) {
+  if (!stops_.full()) stops_.push_back({now, cause});
+}
+
+void Cart::finished(Instant, const Ending& ending) {
+  ending_ = ending;
+  ended_ = true;
+}
+
+// ---- the record
+
+RunRecord Cart::record() const {
+  RunRecord r;
+  r.outcome = ending_.outcome;
+  r.reason = reason_text(ending_);
+  r.seed = config_.seed;
+  r.cell = config_.cell;
+  for (const PhasePassed& phase : phases_) {
+    r.phases.push_back({std::string(state_row(phase.state).name), phase.start.seconds(), phase.end.seconds()});
+  }
+  r.decisions_hash = hash_text(journal_->decisions_hash());
+  r.hand_eye = bench_->hand_eye();
+  r.solver = config_.calibration.solver;
+  r.intrinsics = devices_.color.intrinsics();
+  r.calibration_views = bench_->calibration_records();
+  if (bench_->mapped()) {
+    MappingRecord m;
+    m.resolution_m = config_.map.resolution_m;
+    m.views = bench_->mapping_views();
+    m.voxels = bench_->map().counts();
+    m.remaining = bench_->remaining();
+    m.frames_integrated = bench_->frames_integrated();
+    m.frames_dropped = bench_->frames_dropped();
+    r.mapping = std::move(m);
+    r.map_pictures = bench_->map_pictures();
+  }
+  SafetyRecord safety;
+  safety.clearance = bench_->clearance_terms();
+  if (min_clearance_m_ < 1e8) safety.min_clearance_m = min_clearance_m_;
+  for (const MotionStop& stop : stops_) {
+    const auto cause = fmt::format("E{} {}", static_cast<int>(stop.cause), fault_row(stop.cause).text);
+    safety.stops.push_back({stop.time.seconds(), cause});
+    r.faults.push_back({stop.time.seconds(), stop.cause, ""});
+  }
+  r.safety = std::move(safety);
+  MemoryRecord memory;
+  memory.budget_bytes = static_cast<std::uint64_t>(config_.memory.budget_mib) * memory::kMiB;
+  memory.peak_bytes = memory::peak_bytes();
+  memory.loop_allocations_after_seal = loop_allocations_;
+  for (const memory::BudgetRow& row : memory::kBudget) {
+    memory.pools.push_back({std::string(row.name), row.bytes(), memory::peak_bytes(row.pool)});
+  }
+  r.memory = std::move(memory);
+  r.provenance.version = version_text();
+  r.provenance.arm_model = config_.arm.model;
+  r.provenance.config_yaml = print_config(config_);
+  r.wall.started = started_;
+  r.wall.total_s = static_cast<double>(monotonic_ns()) * 1e-9 - wall_start_s_;
+  r.wall.stall_s = stall_s_;
+  r.wall.rss_bytes = resident_bytes();
+  r.wall.workers = config_.workers;
+  return r;
+}
+
+MapFiles Cart::map_files() const {
+  MapFiles files;
+  if (!bench_->mapped()) return files;
+  const auto into = [](std::string& text) {
+    return [&text](std::span<const std::byte> bytes) {
+      text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    };
+  };
+  auto bt = into(files.collision_map_bt);
+  write_bt(bench_->map(), kOctreeDepth, bt);
+  auto ot = into(files.map_ot);
+  write_ot(bench_->map(), kOctreeDepth, ot);
+  auto ply = into(files.map_ply);
+  write_ply(bench_->map(), false, ply);
+  files.occupied = merge_occupied(bench_->map());
+  return files;
+}
+
+}  // namespace firstlook

@@ -1,0 +1,126 @@
+/// One job of the cart: devices, loop, machine, jobs and journal put together. The live side of the decisions.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "app/jobs/cart_jobs.hpp"
+#include "app/jobs/workbench.hpp"
+#include "app/machine/machine.hpp"
+#include "app/report/run_files.hpp"
+#include "app/report/run_record.hpp"
+#include "app/shell/decision_log.hpp"
+#include "app/shell/device_sources.hpp"
+#include "platform/journal/journal.hpp"
+#include "platform/linux/terminal.hpp"
+#include "platform/loop/event_loop.hpp"
+
+namespace firstlook {
+
+struct CartDevices {
+  hal::RobotArm& arm;
+  hal::ColorCamera& color;
+  hal::DepthCamera& depth;
+  hal::Pendant& pendant;
+  hal::Panel& panel;
+};
+
+struct CartOptions {
+  RunScope scope = RunScope::kEverything;
+  bool real_time = false;
+  std::string journal_path;
+  double virtual_time_max_s = 3 * 3600;  ///< a job in virtual time that takes longer is stopped
+};
+
+/// A phase of the job as it happened.
+struct PhasePassed {
+  StateId state = StateId::kNone;
+  Instant start{}, end{};
+};
+
+/// A stop of the motion and its cause.
+struct MotionStop {
+  Instant time{};
+  Fault cause = Fault::kInternal;
+};
+
+class Cart final : private DecisionSink, private EventHandler, private DecisionLog {
+ public:
+  /// Takes all memory. Errors: those of Workbench::make and JournalWriter::create_file.
+  [[nodiscard]] static Result<std::unique_ptr<Cart>> make(const Config& config, const CartOptions& options,
+                                                          const CellFacts& facts, const CartDevices& devices,
+                                                          Narrator& narrator);
+  ~Cart() override;
+
+  /// Boots, seals the memory, runs the job to its end. Error: that of the loop (nothing is due any more).
+  [[nodiscard]] Status run();
+
+  /// What was recorded; after run().
+  [[nodiscard]] RunRecord record() const;
+  [[nodiscard]] MapFiles map_files() const;
+  [[nodiscard]] const Workbench& bench() const { return *bench_; }
+  [[nodiscard]] PublishedSpace& published() { return bench_->published(); }
+  [[nodiscard]] const Ending& ending() const { return ending_; }
+
+ private:
+  Cart(const Config& config, const CartOptions& options, const CartDevices& devices, Narrator& narrator);
+
+  // DecisionSink: carries out.
+  void state_entered(Instant now, StateId state) override;
+  void move_arm(Instant now, const hal::Segment& segment) override;
+  void stop_arm(Instant now) override;
+  void start_job(Instant now, JobKind kind, std::uint32_t number, std::span<const std::byte> arguments) override;
+  void set_timer(Instant now, MachineTimer timer, Instant due) override;
+  void cancel_timer(Instant now, MachineTimer timer) override;
+  void show(Instant now, std::string_view line) override;
+  void light(Instant now, hal::Light light) override;
+  void forget_known_free(Instant now) override;
+  void stop_recorded(Instant now, Fault cause) override;
+  void finished(Instant now, const Ending& ending) override;
+  // DecisionLog: records.
+  void decision(DecisionKind kind, Instant now, std::span<const std::byte> bytes) override;
+  // EventHandler
+  void on_event(const Event& event) override;
+  void end_of_turn(Instant now) override;
+
+  void watch_arm(const ArmReported& report);
+
+  Config config_;
+  CartOptions options_;
+  CartDevices devices_;
+  Narrator& narrator_;
+  std::unique_ptr<Clock> clock_;
+  std::unique_ptr<WorkerPool> workers_;
+  std::unique_ptr<Workbench> bench_;
+  std::unique_ptr<CartJobs> jobs_;
+  std::unique_ptr<JobRunner> runner_;
+  std::unique_ptr<JournalWriter> journal_;
+  TimerQueue timers_;
+  CountingWatchdog watchdog_;
+  std::unique_ptr<EventLoop> loop_;
+  std::optional<ArmSource> arm_source_;
+  FrameSource<ColorFrameArrived> color_source_;
+  FrameSource<DepthFrameArrived> depth_source_;
+  OperatorSource<hal::Pendant> pendant_source_;
+  OperatorSource<hal::Panel> panel_source_;
+  HostSource host_;
+  LoggedDecisions decisions_;
+  std::optional<Machine> machine_;
+  JobRequest request_;
+
+  // What the report tells.
+  FixedVector<PhasePassed, 128> phases_;
+  FixedVector<MotionStop, 128> stops_;
+  Ending ending_{Outcome::kFaulted, true, Fault::kInternal};
+  bool ended_ = false;
+  double min_clearance_m_ = 1e9;
+  double stall_s_ = 0;
+  Instant job_started_{};
+  std::uint32_t awaited_job_ = 0;
+  std::uint64_t loop_allocations_ = 0;
+  std::string started_;
+  double wall_start_s_ = 0;
+};
+
+}  // namespace firstlook

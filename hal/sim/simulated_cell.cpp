@@ -1,0 +1,167 @@
+#include "hal/sim/simulated_cell.hpp"
+
+#include "algorithms/kinematics/arm_model.hpp"
+#include "hal/sim/cell_file.hpp"
+#include "hal/sim/faults.hpp"
+#include "hal/sim/random_streams.hpp"
+#include "hal/sim/scene_history.hpp"
+#include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/simulated_cameras.hpp"
+#include "hal/sim/simulated_operator.hpp"
+#include "hal/sim/truth_grader.hpp"
+#include "platform/memory/allocation_guard.hpp"
+
+namespace firstlook::sim {
+namespace {
+
+constexpr Duration kColorPeriod{1'000'000'000 / 15};
+constexpr Duration kDepthPeriod{1'000'000'000 / 30};
+constexpr Instant kColorFirst{milliseconds(10).ns};
+constexpr Instant kDepthFirst{milliseconds(5).ns};
+
+/// Hands the body's motion to the monitor together with the world of that moment.
+class MonitorInTime final : public BodyWatcher {
+ public:
+  MonitorInTime(ContactMonitor& monitor, const SceneHistory& scenes) : monitor_(monitor), scenes_(scenes) {}
+  bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) override {
+    monitor_.set_world(scenes_.at(stamp).world);
+    return monitor_.body_moved(stamp, from_rad, to_rad);
+  }
+
+ private:
+  ContactMonitor& monitor_;
+  const SceneHistory& scenes_;
+};
+
+FrameTiming color_timing(const Faults& faults, std::uint64_t seed) {
+  FrameTiming timing;
+  timing.period = kColorPeriod;
+  timing.first = kColorFirst;
+  timing.drop_share = faults.color_drop;
+  timing.stall_s = faults.color_stall_s;
+  timing.freeze_s = faults.color_freeze_s;
+  timing.clock_offset_s = faults.color_clock_offset_s;
+  timing.seed = seed;
+  timing.drop_stream = kColorDropStream;
+  return timing;
+}
+
+FrameTiming depth_timing(const Faults& faults, std::uint64_t seed) {
+  FrameTiming timing;
+  timing.period = kDepthPeriod;
+  timing.first = kDepthFirst;
+  timing.drop_share = faults.depth_drop;
+  timing.stall_s = faults.depth_stall_s;
+  timing.freeze_s = faults.depth_freeze_s;
+  timing.clock_offset_s = faults.depth_clock_offset_s;
+  timing.seed = seed;
+  timing.drop_stream = kDepthDropStream;
+  return timing;
+}
+
+CellDescription describe_cell(const Scene& scene, const Renderer& renderer, DepthDetail detail) {
+  CellDescription d;
+  d.name = scene.name;
+  d.arm_model = scene.arm_model;
+  d.start_rad = scene.start_rad;
+  d.color = scene.mount.color;
+  d.depth = renderer.depth_intrinsics(detail);
+  d.depth_range_min_m = renderer.sensor().range_min_m;
+  d.depth_range_max_m = renderer.sensor().range_max_m;
+  d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
+  d.camera_T_depth = scene.mount.camera_T_depth;
+  d.board_columns = scene.board.spec.inner_columns;
+  d.board_rows = scene.board.spec.inner_rows;
+  d.board_square_m = scene.board.spec.square_size_m;
+  d.cart_top_m = scene.safe_zone.floor_m;
+  d.safe_zone = scene.safe_zone;
+  for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});
+  return d;
+}
+
+Truth truth_of(const Scene& scene, const ArmModel& model, const SceneSpan& span, const SimulationOptions& options) {
+  Truth truth;
+  truth.arm = model;
+  truth.world = &span.world;
+  truth.link = scene.mount.link;
+  truth.link_T_camera = scene.mount.link_T_camera;
+  truth.camera_T_depth = scene.mount.camera_T_depth;
+  truth.depth = scene.mount.depth;
+  truth.space.zone = scene.safe_zone;
+  for (const Region& region : scene.keep_out) truth.space.keep_out_boxes.push_back({region.low_m, region.high_m});
+  truth.start_rad = scene.start_rad;
+  for (const Region& region : scene.regions) truth.regions.push_back({region.name, region.low_m, region.high_m});
+  truth.seed = options.seed;
+  truth.workers = options.workers;
+  return truth;
+}
+
+SimulatedArmOptions arm_options(const Scene& scene, const ArmModel& model, const Faults& faults, std::uint64_t seed) {
+  SimulatedArmOptions options;
+  options.model = model;
+  options.start_rad = scene.start_rad;
+  options.seed = seed;
+  options.script = controller_script(faults);
+  return options;
+}
+
+class Cell final : public SimulatedCell {
+ public:
+  Cell(const Scene& loaded, const ArmModel& model, const Faults& faults, const SimulationOptions& options)
+      : scenes_(loaded, faults),
+        first_(scenes_.at(Instant{})),
+        scene_(first_.renderer.scene()),
+        description_(describe_cell(scene_, first_.renderer, detail(options))),
+        grader_(truth_of(scene_, model, first_, options)),
+        watcher_(grader_.monitor(), scenes_),
+        arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
+        rig_(model, scene_.mount, arm_),
+        color_(color_timing(faults, options.seed), arm_, rig_, scenes_, options.fast_sensor),
+        depth_(depth_timing(faults, options.seed), arm_, rig_, scenes_, detail(options)),
+        pendant_(pendant_script(faults)),
+        panel_(panel_script(faults)) {}
+
+  [[nodiscard]] const CellDescription& description() const override { return description_; }
+  [[nodiscard]] hal::RobotArm& arm() override { return arm_; }
+  [[nodiscard]] hal::ColorCamera& color() override { return color_; }
+  [[nodiscard]] hal::DepthCamera& depth() override { return depth_; }
+  [[nodiscard]] hal::Pendant& pendant() override { return pendant_; }
+  [[nodiscard]] hal::Panel& panel() override { return panel_; }
+  [[nodiscard]] Grader& grader() override { return grader_; }
+
+ private:
+  static DepthDetail detail(const SimulationOptions& options) {
+    return options.fast_sensor ? DepthDetail::kFast : DepthDetail::kFull;
+  }
+
+  SceneHistory scenes_;
+  const SceneSpan& first_;
+  const Scene& scene_;
+  CellDescription description_;
+  TruthGrader grader_;
+  MonitorInTime watcher_;
+  SimulatedArm arm_;
+  CameraRig rig_;
+  SimulatedColorCamera color_;
+  SimulatedDepthCamera depth_;
+  SimulatedPendant pendant_;
+  SimulatedPanel panel_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options) {
+  const memory::SimulationScope simulation;
+  const Result<Faults> faults = parse_faults(options.faults);
+  if (!faults) return std::unexpected(faults.error());
+  const Result<Scene> scene = load_cell(options.cell, options.seed);
+  if (!scene) return std::unexpected(scene.error());
+  const std::optional<ArmModel> model = find_arm_model(scene->arm_model);
+  if (!model) return failure(Fault::kCellInvalid, "{}: no arm model '{}'", scene->name, scene->arm_model);
+  if (scene->start_rad.size() != model->joints) {
+    return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, model->joints);
+  }
+  return std::make_unique<Cell>(*scene, *model, *faults, options);
+}
+
+}  // namespace firstlook::sim

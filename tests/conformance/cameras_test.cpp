@@ -1,0 +1,144 @@
+/// What every camera must do, whoever implements it.
+#include <catch2/catch.hpp>
+#include <vector>
+
+#include "tests/conformance/simulated_devices.hpp"
+#include "tests/support/mock_color_camera.hpp"
+#include "tests/support/mock_depth_camera.hpp"
+
+using namespace firstlook;
+
+namespace {
+
+Instant at(double t_s) { return Instant{seconds(t_s).ns}; }
+
+/// Each fixture: a camera that runs well, and one that loses some frames.
+struct SimulatedColor {
+  using Pixel = std::uint8_t;
+  std::unique_ptr<sim::SimulatedCell> cell = test::empty_cell(), lossy_cell = test::empty_cell("color.drop=0.3");
+  hal::ColorCamera& camera = cell->color();
+  hal::ColorCamera& lossy = lossy_cell->color();
+};
+struct SimulatedDepth {
+  using Pixel = std::uint16_t;
+  std::unique_ptr<sim::SimulatedCell> cell = test::empty_cell(), lossy_cell = test::empty_cell("depth.drop=0.3");
+  hal::DepthCamera& camera = cell->depth();
+  hal::DepthCamera& lossy = lossy_cell->depth();
+};
+template <typename Camera, typename PixelType>
+struct Mock {
+  using Pixel = PixelType;
+  Mock() {
+    for (std::uint32_t n = 2; n < 60; n += 3) lossy.lose(n);
+  }
+  Camera camera, lossy;
+};
+using MockColor = Mock<mock::MockColorCamera, std::uint8_t>;
+using MockDepth = Mock<mock::MockDepthCamera, std::uint16_t>;
+
+template <typename Pixel>
+struct Image {
+  explicit Image(const CameraIntrinsics& i)
+      : width(i.width), height(i.height), pixels(static_cast<std::size_t>(i.width) * static_cast<std::size_t>(i.height)) {}
+  ImageView<Pixel> view() { return {pixels.data(), width, height}; }
+  int width, height;
+  std::vector<Pixel> pixels;
+};
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a camera keeps the order of its frames and never delivers the future", "[hal][camera]",
+                   SimulatedColor, SimulatedDepth, MockColor, MockDepth) {
+  TestType device;
+  Instant last{-1};
+  std::optional<std::uint32_t> sequence;
+  int frames = 0;
+  while (device.camera.next_due() <= at(2)) {
+    const Instant now = device.camera.next_due();
+    const auto frame = device.camera.poll(now);
+    REQUIRE(frame.has_value());
+    CHECK(frame->stamp <= now);
+    CHECK(frame->stamp > last);
+    if (sequence) CHECK(frame->sequence == *sequence + 1);
+    CHECK_FALSE(device.camera.poll(now).has_value());  // each once
+    CHECK(device.camera.next_due() > now);
+    last = frame->stamp;
+    sequence = frame->sequence;
+    ++frames;
+  }
+  CHECK(frames >= 20);
+  CHECK(device.camera.counters().frames == static_cast<std::uint64_t>(frames));
+  CHECK(device.camera.counters().lost == 0);
+}
+
+TEMPLATE_TEST_CASE("a camera that is polled late gives its newest frame", "[hal][camera]", SimulatedColor,
+                   SimulatedDepth, MockColor, MockDepth) {
+  TestType device;
+  const auto frame = device.camera.poll(at(1));
+  REQUIRE(frame.has_value());
+  CHECK(frame->stamp > at(0.85));
+  CHECK(frame->sequence > 10);
+}
+
+TEMPLATE_TEST_CASE("lost frames leave gaps in the sequence and are counted", "[hal][camera]", SimulatedColor,
+                   SimulatedDepth, MockColor, MockDepth) {
+  TestType device;
+  std::uint64_t received = 0;
+  std::uint32_t last = 0;
+  while (device.lossy.next_due() <= at(3)) {
+    if (const auto frame = device.lossy.poll(device.lossy.next_due())) {
+      ++received;
+      last = frame->sequence;
+    }
+  }
+  const hal::StreamCounters counters = device.lossy.counters();
+  CHECK(counters.lost > 3);
+  CHECK(received + counters.lost == counters.frames);
+  CHECK(received < last);
+}
+
+TEMPLATE_TEST_CASE("a camera holds its last 32 frames, and says when one is gone", "[hal][camera]", SimulatedColor,
+                   SimulatedDepth, MockColor, MockDepth) {
+  TestType device;
+  std::vector<hal::Frame> frames;
+  while (frames.size() < 150) {
+    if (const auto frame = device.camera.poll(device.camera.next_due())) frames.push_back(*frame);
+  }
+  Image<typename TestType::Pixel> image(device.camera.intrinsics());
+  CHECK(device.camera.read(frames[frames.size() - 1], image.view()).has_value());
+  CHECK(device.camera.read(frames[frames.size() - 32], image.view()).has_value());
+  const Status gone = device.camera.read(frames[0], image.view());
+  REQUIRE_FALSE(gone.has_value());
+  CHECK(gone.error().fault == Fault::kFrameGone);
+}
+
+TEMPLATE_TEST_CASE("reading is repeatable and refuses an image of the wrong size", "[hal][camera]", SimulatedColor,
+                   SimulatedDepth, MockColor, MockDepth) {
+  TestType device;
+  const auto frame = device.camera.poll(at(1));
+  REQUIRE(frame.has_value());
+  const CameraIntrinsics& intrinsics = device.camera.intrinsics();
+  REQUIRE(intrinsics.width > 0);
+  REQUIRE(intrinsics.fx > 0);
+  Image<typename TestType::Pixel> once(intrinsics), again(intrinsics);
+  REQUIRE(device.camera.read(*frame, once.view()).has_value());
+  REQUIRE(device.camera.read(*frame, again.view()).has_value());
+  CHECK(once.pixels == again.pixels);
+  CHECK(std::ranges::any_of(once.pixels, [](auto pixel) { return pixel != 0; }));
+  ImageView<typename TestType::Pixel> wrong = once.view();
+  wrong.height /= 2;
+  CHECK_FALSE(device.camera.read(*frame, wrong).has_value());
+}
+
+TEMPLATE_TEST_CASE("depth is in the units that the camera states", "[hal][camera]", SimulatedDepth, MockDepth) {
+  TestType device;
+  const auto frame = device.camera.poll(at(1));
+  REQUIRE(frame.has_value());
+  Image<std::uint16_t> image(device.camera.intrinsics());
+  REQUIRE(device.camera.read(*frame, image.view()).has_value());
+  for (const std::uint16_t pixel : image.pixels) {
+    if (pixel == 0) continue;
+    const double depth_m = pixel / device.camera.units_per_m();
+    CHECK((depth_m > 0.3 && depth_m < 8));
+  }
+}

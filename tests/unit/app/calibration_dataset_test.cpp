@@ -1,0 +1,262 @@
+#include "app/dataset/calibration_dataset.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+
+#include "algorithms/calibration/verdict.hpp"
+#include "app/cli/calibrate_command.hpp"
+#include "app/dataset/gray_image_file.hpp"
+#include "tests/unit/calibration/synthetic_views.hpp"
+
+using namespace firstlook;
+using test::Setup;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder below the system's temporary folder that goes away with the object.
+struct Folder {
+  fs::path path;
+  explicit Folder(const std::string& name) : path(fs::temp_directory_path() / ("firstlook_calibration_" + name)) {
+    fs::remove_all(path);
+    fs::create_directories(path);
+  }
+  ~Folder() { fs::remove_all(path); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  void write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
+};
+
+std::string numbers(const Pose& pose) {
+  const Eigen::Quaterniond q(pose.linear());
+  const Eigen::Vector3d t = pose.translation();
+  return fmt::format("{:.12g},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g}", t.x(), t.y(), t.z(), q.x(), q.y(),
+                     q.z(), q.w());
+}
+
+std::string board_yaml(const BoardSpec& b) {
+  return fmt::format("type: checkerboard\ninner_columns: {}\ninner_rows: {}\nsquare_size_m: {}\n", b.inner_columns,
+                     b.inner_rows, b.square_size_m);
+}
+
+std::string camera_yaml(const CameraIntrinsics& c) {
+  return fmt::format(
+      "image_width: {}\nimage_height: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}, 0, {}, 0, {}, {}, 0, 0, 1]}}\n"
+      "distortion_model: plumb_bob\ndistortion_coefficients: {{rows: 1, cols: 5, data: [{}, {}, {}, {}, {}]}}\n",
+      c.width, c.height, c.fx, c.cx, c.fy, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3);
+}
+
+const std::string kPosesHeader = "image,x,y,z,qx,qy,qz,qw\n";
+const std::string kPairsHeader =
+    "flange_x,flange_y,flange_z,flange_qx,flange_qy,flange_qz,flange_qw,"
+    "board_x,board_y,board_z,board_qx,board_qy,board_qz,board_qw\n";
+
+/// Writes a data set with corners and returns its views.
+std::vector<CalibrationView> write_corners(const Folder& folder, const Setup& setup, int count) {
+  Random random(61);
+  const auto views = test::observe_views(setup, count, random);
+  std::string poses = kPosesHeader, corners = "image,column,row,u_px,v_px\n";
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    poses += fmt::format("{}.png,{}\n", i, numbers(views[i].base_T_flange.pose()));
+    for (int c = 0; c < setup.board.corners(); ++c) {
+      const auto& px = views[i].corners_px[static_cast<std::size_t>(c)];
+      corners += fmt::format("{}.png,{},{},{:.9g},{:.9g}\n", i, c % setup.board.inner_columns,
+                             c / setup.board.inner_columns, px.x(), px.y());
+    }
+  }
+  folder.write("board.yaml", board_yaml(setup.board));
+  folder.write("camera_info.yaml", camera_yaml(setup.camera));
+  folder.write("poses.csv", poses);
+  folder.write("corners.csv", corners);
+  return views;
+}
+
+/// The fault and the words of reading a folder that must be refused.
+void check_refused(const Folder& folder, Fault fault, const std::string& words) {
+  const auto data = read_calibration_dataset(folder.path);
+  REQUIRE_FALSE(data);
+  CHECK(data.error().fault == fault);
+  CHECK_THAT(std::string(data.error().detail()), Catch::Contains(words));
+}
+
+/// The folder of recorded data beside the checkout, when it is there.
+std::optional<fs::path> franka() {
+  const char* named = std::getenv("FIRSTLOOK_DATA");
+  const fs::path data =
+      named != nullptr ? fs::path(named) : fs::path(__FILE__).parent_path() / "../../../../shared/data";
+  const fs::path folder = data / "hand_eye_franka";
+  if (fs::is_directory(folder)) return folder;
+  std::cout << "skipped: no recorded data at " << folder << " (set FIRSTLOOK_DATA)\n";
+  return std::nullopt;
+}
+
+}  // namespace
+
+TEST_CASE("a data set of corners is read and solved", "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("corners");
+  const auto views = write_corners(folder, setup, 15);
+  const auto data = read_calibration_dataset(folder.path);
+  REQUIRE(data);
+  CHECK(data->source == CalibrationSource::kCorners);
+  CHECK(data->board == setup.board);
+  CHECK(data->camera == setup.camera);
+  REQUIRE(data->views.size() == 15);
+  CHECK((data->views[3].corners_px[7] - views[3].corners_px[7]).norm() < 1e-6);
+  CHECK(pose_difference(data->views[3].base_T_flange.pose(), views[3].base_T_flange.pose()).norm() < 1e-10);
+  CHECK(data->names[3] == "3.png");
+  CHECK(run_calibrate_command({folder.path.string(), "tsai-lenz", true, false}) == 0);
+}
+
+TEST_CASE("without camera_info.yaml the intrinsics come from the views", "[app][calibration]") {
+  Setup setup;
+  setup.distance_min_m = 0.35;
+  setup.distance_max_m = 0.5;
+  const Folder folder("no_camera");
+  write_corners(folder, setup, 20);
+  fs::remove(folder.path / "camera_info.yaml");
+  const auto data = read_calibration_dataset(folder.path);
+  REQUIRE(data);
+  CHECK(data->intrinsics_estimated);
+  CHECK(data->camera.fx == Approx(setup.camera.fx).epsilon(0.01));
+  const auto result = calibrate_hand_eye(data->camera, data->board, data->views);
+  REQUIRE(result);
+  CHECK((result->flange_T_camera.translation() - setup.flange_T_camera.translation()).norm() < 5e-3);
+}
+
+TEST_CASE("a data set of pose pairs is read and solved", "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("pairs");
+  Random random(62);
+  std::string text = kPairsHeader;
+  for (const PosePair& pair : test::observe_pairs(setup, 12, random)) {
+    text += numbers(pair.base_T_flange.pose()) + "," + numbers(pair.camera_T_board.pose()) + "\n";
+  }
+  folder.write("pairs.csv", text);
+  const auto data = read_calibration_dataset(folder.path);
+  REQUIRE(data);
+  CHECK(data->pairs.size() == 12);
+  const auto result = calibrate_hand_eye_from_pairs(data->pairs);
+  REQUIRE(result);
+  CHECK((result->flange_T_camera.translation() - setup.flange_T_camera.translation()).norm() < 2e-3);
+  CHECK(run_calibrate_command({folder.path.string(), "", false, true}) == 0);
+
+  folder.write("pairs.csv", text + text.substr(kPairsHeader.size()));
+  check_refused(folder, Fault::kDataMalformed, "pairs.csv:14: the same pair");
+  folder.write("pairs.csv", kPairsHeader);
+  check_refused(folder, Fault::kDataMalformed, "no pairs");
+}
+
+TEST_CASE("what is missing or malformed is named with file and line", "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("broken");
+  CHECK(read_calibration_dataset("/nowhere/at/all").error().fault == Fault::kDataMissing);
+  check_refused(folder, Fault::kDataMissing, "board.yaml");
+  write_corners(folder, setup, 5);
+  const std::string identity = ",0.1,0.2,0.3,0,0,0,1\n";
+
+  folder.write("poses.csv", kPosesHeader + "0.png" + identity + "1.png,0.1,0.2,0.3,0,0,1\n");
+  check_refused(folder, Fault::kDataMalformed, "poses.csv:3: 7 columns instead of 8");
+  folder.write("poses.csv", kPosesHeader + "0.png,nan,0.2,0.3,0,0,0,1\n");
+  check_refused(folder, Fault::kDataMalformed, "poses.csv:2: x is 'nan'");
+  folder.write("poses.csv", kPosesHeader + "0.png,0.1,0.2,0.3,0,0,0,1.01\n");
+  check_refused(folder, Fault::kDataMalformed, "poses.csv:2: a quaternion of length");
+  folder.write("poses.csv", kPosesHeader + "0.png,0.1,0.2,0.3,0,0,0,0\n");
+  check_refused(folder, Fault::kDataMalformed, "a quaternion of length");
+  folder.write("poses.csv", kPosesHeader + "0.png,335,-32,308,0,0,0,1\n");
+  check_refused(folder, Fault::kDataMalformed, "millimetres");
+  folder.write("poses.csv", kPosesHeader + "0.png" + identity + "0.png" + identity);
+  check_refused(folder, Fault::kDataMalformed, "poses.csv:3: image '0.png' a second time");
+  folder.write("poses.csv", "image,x,y,z,qx,qy,qz\n");
+  check_refused(folder, Fault::kDataMalformed, "no column 'qw'");
+  folder.write("poses.csv", "");
+  check_refused(folder, Fault::kDataMalformed, "empty");
+  fs::remove(folder.path / "poses.csv");
+  check_refused(folder, Fault::kDataMissing, "poses.csv");
+
+  write_corners(folder, setup, 5);
+  folder.write("corners.csv", "image,column,row,u_px,v_px\n0.png,0,0,700,20\n");
+  check_refused(folder, Fault::kDataMalformed, "corners.csv:2: corner at (700, 20) px lies outside");
+  folder.write("corners.csv", "image,column,row,u_px,v_px\n0.png,8,0,70,20\n");
+  check_refused(folder, Fault::kDataMalformed, "corner column 8");
+  folder.write("corners.csv", "image,column,row,u_px,v_px\n0.png,1,0,70,20\n0.png,1,0,70,20\n");
+  check_refused(folder, Fault::kDataMalformed, "corners.csv:3: this corner");
+}
+
+TEST_CASE("unusable boards and cameras are refused", "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("bad_yaml");
+  write_corners(folder, setup, 5);
+  folder.write("board.yaml", "type: checkerboard\ninner_columns: 8\ninner_rows: 6\nsquare_size_m: 0\n");
+  check_refused(folder, Fault::kDataMalformed, "board.yaml:4");
+  folder.write("board.yaml", "type: checkerboard\ninner_columns: 8\ninner_rows: 6\nsquare_size_m: 30\n");
+  check_refused(folder, Fault::kDataMalformed, "millimetres");
+  folder.write("board.yaml", "type: charuco\ninner_columns: 8\ninner_rows: 6\nsquare_size_m: 0.03\n");
+  check_refused(folder, Fault::kDataMalformed, "charuco");
+  folder.write("board.yaml", "type: checkerboard\ninner_columns: eight\ninner_rows: 6\nsquare_size_m: 0.03\n");
+  check_refused(folder, Fault::kDataMalformed, "board.yaml:2");
+  folder.write("board.yaml", "type: [checkerboard\n");
+  check_refused(folder, Fault::kDataMalformed, "board.yaml");
+  folder.write("board.yaml", board_yaml(setup.board));
+  folder.write("camera_info.yaml", "image_width: 640\nimage_height: 480\n");
+  check_refused(folder, Fault::kDataMalformed, "camera_matrix");
+  CameraIntrinsics bad = setup.camera;
+  bad.fx = -1;
+  folder.write("camera_info.yaml", camera_yaml(bad));
+  check_refused(folder, Fault::kDataMalformed, "camera_info.yaml:3");
+}
+
+TEST_CASE("pictures that are none are refused", "[app][calibration]") {
+  const Folder folder("pictures");
+  CHECK(read_gray_image(folder.path / "none.png").error().fault == Fault::kDataMissing);
+  folder.write("text.png", "not a picture at all");
+  CHECK(read_gray_image(folder.path / "text.png").error().fault == Fault::kDataMalformed);
+  folder.write("cut.png", std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16));
+  CHECK(read_gray_image(folder.path / "cut.png").error().fault == Fault::kDataMalformed);
+  folder.write("cut.jpg", std::string("\xFF\xD8\xFF\xE0\0\x10JFIF\0", 11));
+  CHECK(read_gray_image(folder.path / "cut.jpg").error().fault == Fault::kDataMalformed);
+}
+
+TEST_CASE("exit codes of the command", "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("exit_codes");
+  CHECK(run_calibrate_command({"", "", false, false}) == 2);
+  CHECK(run_calibrate_command({folder.path.string(), "daniilidis", false, false}) == 2);
+  CHECK(run_calibrate_command({folder.path.string(), "", false, false}) == 3);
+  write_corners(folder, setup, 4);  // solved, too few views to be trusted
+  CHECK(run_calibrate_command({folder.path.string(), "", false, false}) == 0);
+  CHECK(run_calibrate_command({folder.path.string(), "", true, false}) == 5);
+  write_corners(folder, setup, 2);
+  CHECK(run_calibrate_command({folder.path.string(), "", false, false}) == 3);
+}
+
+TEST_CASE("the recorded Franka set gives its published transform, with honest sigmas", "[app][calibration]") {
+  const auto folder = franka();
+  if (!folder) return;
+  const auto data = read_calibration_dataset(*folder);
+  REQUIRE(data);
+  REQUIRE(data->views.size() == 8);
+  const auto result = calibrate_hand_eye(data->camera, data->board, data->views);
+  REQUIRE(result);
+  const Eigen::Vector3d published(0.0577, -0.0339, -0.0423);
+  CHECK((result->flange_T_camera.translation() - published).norm() < 1.5e-3);
+  CHECK(result->views == 8);
+  // The set is consistent to about 4.5 mm only: arm sigma and hand-eye sigma must say so.
+  CHECK(result->arm_sigma.translation_m > 1e-3);
+  CHECK(result->sigma_translation_m.maxCoeff() > 1e-3);
+  CHECK(result->sigma_translation_m.maxCoeff() < 1e-2);
+  CHECK(result->verdict == Verdict::kRejected);
+  CHECK(result->ax_xb_all_pairs.rotation_rms_deg == Approx(0.456).margin(0.35));
+  CHECK(result->ax_xb_all_pairs.translation_rms_mm == Approx(5.41).margin(3));
+
+  // Without any one of the views the answer stays within what the sigmas say.
+  for (std::size_t out = 0; out < 8; ++out) {
+    auto views = data->views;
+    views.erase(views.begin() + static_cast<std::ptrdiff_t>(out));
+    const auto less = solve_hand_eye(data->camera, data->board, views);
+    REQUIRE(less);
+    CHECK((less->flange_T_camera.translation() - published).norm() < 3 * result->sigma_translation_m.norm());
+  }
+}
