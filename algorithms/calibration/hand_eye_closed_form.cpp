@@ -33,11 +33,14 @@ Motion motion_between(const PosePair& from, const PosePair& to) {
   return m;
 }
 
+/// Between all views and in both directions, so that the order of the views means nothing.
 std::vector<Motion> all_motions(std::span<const PosePair> pairs) {
   std::vector<Motion> motions;
-  motions.reserve(pairs.size() * pairs.size() / 2);
+  motions.reserve(pairs.size() * pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    for (std::size_t j = i + 1; j < pairs.size(); ++j) motions.push_back(motion_between(pairs[i], pairs[j]));
+    for (std::size_t j = 0; j < pairs.size(); ++j) {
+      if (i != j) motions.push_back(motion_between(pairs[i], pairs[j]));
+    }
   }
   return motions;
 }
@@ -63,39 +66,49 @@ Eigen::Vector3d half_sine_vector(const Eigen::Vector3d& rotation_vector) {
   return angle < 1e-12 ? rotation_vector : Eigen::Vector3d(rotation_vector * (2 * std::sin(angle / 2) / angle));
 }
 
-/// Tsai and Lenz, eq. 12: P' = tan(angle / 2) axis of the rotation that takes camera motions to flange motions, the
-/// camera's axes first turned by `turn`.
-Eigen::Vector3d tsai_lenz_vector(std::span<const Motion> motions, const Eigen::Matrix3d& turn) {
+/// Tsai and Lenz, eq. 12, as normal equations for P' = tan(angle / 2) axis of the rotation that takes camera motions to
+/// flange motions.
+struct TsaiLenzEquations {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
+};
+
+/// The camera's axes are first turned by `turn`.
+TsaiLenzEquations tsai_lenz_equations(std::span<const Motion> motions, const Eigen::Matrix3d& turn) {
+  TsaiLenzEquations equations;
   for (const Motion& motion : motions) {
     if (!is_clear(motion)) continue;
     const Eigen::Vector3d a = half_sine_vector(motion.alpha);
     const Eigen::Vector3d b = half_sine_vector(turn * motion.beta);
     const Eigen::Matrix3d skew = cross_matrix(a + b);
-    normal += skew.transpose() * skew;
-    right += skew.transpose() * (b - a);
+    equations.normal += skew.transpose() * skew;
+    equations.right += skew.transpose() * (b - a);
   }
-  return normal.ldlt().solve(right);
+  return equations;
 }
 
-/// P' grows without bound when the hand-eye rotation nears 180 degrees. Of four equal problems with the camera's axes
-/// turned by 0 and by 180 degrees about x, y and z, at least one has at most 120 degrees: the smallest P' is taken.
+/// P' grows without bound and its equations become singular when the hand-eye rotation nears 180 degrees. Of four equal
+/// problems with the camera's axes turned by 0 and by 180 degrees about x, y and z, at least one has at most 120
+/// degrees: the best conditioned is solved.
 Eigen::Matrix3d tsai_lenz_rotation(std::span<const Motion> motions) {
   const std::array<Eigen::Vector3d, 4> turns = {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, -1, -1),
                                                 Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(-1, -1, 1)};
-  Eigen::Vector3d best = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  TsaiLenzEquations best;
+  double best_eigenvalue = -1;
   Eigen::Matrix3d best_turn = Eigen::Matrix3d::Identity();
   for (const Eigen::Vector3d& diagonal : turns) {
     const Eigen::Matrix3d turn = diagonal.asDiagonal();
-    const Eigen::Vector3d p = tsai_lenz_vector(motions, turn);
-    if (p.allFinite() && p.squaredNorm() < best.squaredNorm()) {
-      best = p;
+    const TsaiLenzEquations equations = tsai_lenz_equations(motions, turn);
+    const double smallest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(equations.normal).eigenvalues()(0);
+    if (smallest > best_eigenvalue) {
+      best = equations;
+      best_eigenvalue = smallest;
       best_turn = turn;
     }
   }
-  const double tangent = best.norm();
-  const Eigen::Vector3d rotation_vector = best * (tangent < 1e-12 ? 2.0 : 2 * std::atan(tangent) / tangent);
+  const Eigen::Vector3d p = best.normal.ldlt().solve(best.right);
+  const double tangent = p.norm();
+  const Eigen::Vector3d rotation_vector = p * (tangent < 1e-12 ? 2.0 : 2 * std::atan(tangent) / tangent);
   return rotation_exp(rotation_vector) * best_turn;
 }
 
@@ -199,6 +212,20 @@ AxXbResidual ax_xb_residual_consecutive(std::span<const PosePair> pairs,
   std::vector<Motion> motions;
   for (std::size_t i = 1; i < pairs.size(); ++i) motions.push_back(motion_between(pairs[i - 1], pairs[i]));
   return residual_of(motions, flange_T_camera);
+}
+
+AxXbResidual board_in_base_residual(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera) {
+  if (pairs.empty()) return {};
+  const Transform<Base, Board> mean = mean_board_pose(pairs, flange_T_camera);
+  double rotation2 = 0, translation2 = 0;
+  for (const PosePair& pair : pairs) {
+    const auto seen = pair.base_T_flange * flange_T_camera * pair.camera_T_board;
+    const Vector6d difference = pose_difference(seen.pose(), mean.pose());
+    translation2 += difference.head<3>().squaredNorm();
+    rotation2 += difference.tail<3>().squaredNorm();
+  }
+  const auto n = static_cast<double>(pairs.size());
+  return {std::sqrt(rotation2 / n) / kDegree, std::sqrt(translation2 / n) * 1e3};
 }
 
 }  // namespace firstlook

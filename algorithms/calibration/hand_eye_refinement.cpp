@@ -13,8 +13,6 @@
 namespace firstlook {
 namespace {
 
-/// Corners farther off than this many sigmas carry no weight at all.
-constexpr double kCornerGate = 10;
 /// A view whose corners miss every board pose by more than this is not a picture of the board.
 constexpr double kBoardResidualMax_px = 5;
 
@@ -43,18 +41,18 @@ Status check_input(const CameraIntrinsics& camera, const BoardSpec& board, std::
   return {};
 }
 
+/// Corners are weighed against the view's own board pose, where neither the arm nor other views can mislead.
 std::vector<PreparedView> prepare(const CameraIntrinsics& camera, const BoardSpec& board,
-                                  std::span<const CalibrationView> views) {
+                                  std::span<const CalibrationView> views, const RefinementOptions& options) {
   std::vector<PreparedView> prepared;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto pose = estimate_board_pose(camera, board, views[i].corners_px, kBoardResidualMax_px);
-    if (!pose) continue;
-    PreparedView view{i, {views[i].base_T_flange, pose->camera_T_board}, {}, {}};
-    for (int c = 0; c < board.corners(); ++c) {
-      const auto pixel = project(camera, pose->camera_T_board * board.corner(c));
-      view.residuals_px.push_back(pixel ? (views[i].corners_px[static_cast<std::size_t>(c)] - *pixel).norm() : 1e9);
-    }
-    prepared.push_back(std::move(view));
+    auto seen = estimate_board_pose_robust(camera, board, views[i].corners_px, kBoardResidualMax_px,
+                                           options.corner_loss_scale, options.corner_sigma_min_px);
+    if (!seen) continue;
+    prepared.push_back({i,
+                        {views[i].base_T_flange, seen->pose.camera_T_board},
+                        std::move(seen->residuals_px),
+                        std::move(seen->weights)});
   }
   return prepared;
 }
@@ -69,17 +67,6 @@ double robust_corner_sigma(std::span<const PreparedView> views) {
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
   return *middle / 1.1774;
-}
-
-/// Huber's weights against the view's own board pose, where neither the arm nor other views can mislead.
-void weigh_corners(std::vector<PreparedView>& views, double sigma_px, double loss_scale) {
-  for (PreparedView& view : views) {
-    view.weights.clear();
-    for (const double length : view.residuals_px) {
-      const double sigmas = length / sigma_px;
-      view.weights.push_back(sigmas <= loss_scale ? 1.0 : sigmas <= kCornerGate ? loss_scale / sigmas : 0.0);
-    }
-  }
 }
 
 std::vector<PosePair> pairs_of(std::span<const PreparedView> views) {
@@ -209,14 +196,11 @@ Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const BoardSp
                                    std::span<const CalibrationView> views, const Transform<Flange, Camera>& start,
                                    const RefinementOptions& options) {
   if (const Status fine = check_input(camera, board, views, start); !fine) return std::unexpected(fine.error());
-  std::vector<PreparedView> prepared = prepare(camera, board, views);
+  std::vector<PreparedView> prepared = prepare(camera, board, views, options);
   if (prepared.size() < 3) {
     return failure(Fault::kTooFewViews, "{} of {} views show the board, 3 are the least", prepared.size(),
                    views.size());
   }
-  const double sigma_px = std::max(options.corner_sigma_min_px, robust_corner_sigma(prepared));
-  weigh_corners(prepared, sigma_px, options.corner_loss_scale);
-
   // Views are gated with the start's transform, then once more with the better one that came of it.
   auto hand_eye = start;
   std::vector<PreparedView> used = without_gated(prepared, hand_eye, options.view_gate);

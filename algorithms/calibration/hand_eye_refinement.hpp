@@ -50,7 +50,7 @@ struct Refinement {
 
 /// Refines from a start within some centimetres and tens of degrees. Bundle of the reprojection errors with a Gaussian
 /// prior on each view's arm deviation (Strobl and Hirzinger 2006 in idea), sigmas by expectation maximisation. Corners
-/// and views that do not fit are weighted down or left out. Single thread, about 50 ms for 25 views of 54 corners.
+/// and views that do not fit are weighted down or left out. Single thread, about 70 ms for 25 views of 48 corners.
 /// @return kTooFewViews below 3 views; kDataMalformed for numbers that are not finite or wrong counts;
 /// kDegenerateMotion when the normal equations are singular; kSolveFailed
 [[nodiscard]] Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,

@@ -159,6 +159,7 @@ HandEyeResult start_result(const Refinement& refinement, std::span<const PosePai
   result.arm_sigma = refinement.arm_sigma;
   result.ax_xb_all_pairs = ax_xb_residual_all_pairs(used_pairs, refinement.flange_T_camera);
   result.ax_xb_consecutive = ax_xb_residual_consecutive(used_pairs, refinement.flange_T_camera);
+  result.board_in_base = board_in_base_residual(used_pairs, refinement.flange_T_camera);
   result.views = refinement.views_used;
   result.fits = refinement.views;
   return result;
@@ -175,10 +176,10 @@ UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, s
   UsedViews used;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i < fits.size() && !fits[i].used) continue;
-    const auto pose = estimate_board_pose(camera, board, views[i].corners_px, 5.0);
+    const auto pose = estimate_board_pose_robust(camera, board, views[i].corners_px);
     if (!pose) continue;
     used.views.push_back(views[i]);
-    used.pairs.push_back({views[i].base_T_flange, pose->camera_T_board});
+    used.pairs.push_back({views[i].base_T_flange, pose->pose.camera_T_board});
   }
   return used;
 }

@@ -56,6 +56,7 @@ struct HandEyeResult {
   ArmSigma arm_sigma;
   AxXbResidual ax_xb_all_pairs;
   AxXbResidual ax_xb_consecutive;
+  AxXbResidual board_in_base;  ///< the board's pose in base by each view against their mean
   bool from_pairs = false;
   int views = 0;              ///< used in the solve
   std::vector<ViewFit> fits;  ///< one for each view given

@@ -8,8 +8,8 @@
 
 namespace firstlook {
 
-/// The pose of a sensor that looks at `target_m` from `distance_m` away in unit direction `outward` (from the target to the
-/// sensor), turned by `roll_rad` about its optical axis.
+/// The pose of a sensor that looks at `target_m` from `distance_m` away in unit direction `outward` (from the target to
+/// the sensor), turned by `roll_rad` about its optical axis.
 template <typename Sensor>
 [[nodiscard]] Transform<Base, Sensor> look_at(const Eigen::Vector3d& target_m, const Eigen::Vector3d& outward,
                                               double distance_m, double roll_rad) {

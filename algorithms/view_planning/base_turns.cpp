@@ -39,8 +39,8 @@ TiltJoint tilt_joint(const ArmModel& arm, const JointVector& q_rad) {
   double best_score = -1;
   for (int joint = arm.joints - 2; joint >= 1; --joint) {
     const Eigen::Vector3d axis = frames.base_T_link[static_cast<std::size_t>(joint)].linear().col(2);
-    // Turning about `axis` moves the view's tip along axis x view: upwards is what tilts it. A view that points straight
-    // up or down has no upwards, but then any level axis across it serves.
+    // Turning about `axis` moves the view's tip along axis x view: upwards is what tilts it. A view that points
+    // straight up or down has no upwards, but then any level axis across it serves.
     const Eigen::Vector3d tip = axis.cross(view);
     const double score = tip.norm() * std::sqrt(std::max(0.0, 1 - axis.z() * axis.z()));
     if (score > best_score + 1e-6) {

@@ -34,9 +34,8 @@ struct Search {
 };
 
 bool is_new(const Search& s, const JointVector& q) {
-  return std::all_of(s.inputs.taken.begin(), s.inputs.taken.end(), [&](const JointVector& other) {
-    return (q - other).max_abs() >= s.options.different_min_rad;
-  });
+  return std::all_of(s.inputs.taken.begin(), s.inputs.taken.end(),
+                     [&](const JointVector& other) { return (q - other).max_abs() >= s.options.different_min_rad; });
 }
 
 /// Keeps q when it is new, sees the whole board, is free and does not hide the board: from cheap to dear.
@@ -125,8 +124,7 @@ bool hides_board(const ViewDesignModel& model, const Capsules& body_in_base,
 }
 
 Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs& inputs, Planner& planner,
-                                                    const JointVector& current,
-                                                    const CalibrationViewOptions& options) {
+                                                    const JointVector& current, const CalibrationViewOptions& options) {
   const Status begun =
       planner.begin(inputs.arm, inputs.body, inputs.space, inputs.clearance, current, planning(options));
   if (!begun) return std::unexpected(begun.error());
@@ -167,14 +165,15 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
   return choice;
 }
 
-Result<Turns> bootstrap_views(const ArmModel& arm, const Body& body, const FreeSpace& space,
-                              const Clearance& clearance, const JointVector& at) {
+Result<Turns> bootstrap_views(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
+                              const JointVector& at) {
   const double margin_m = configuration_margin(arm, body, space, clearance, at);
   if (margin_m < kMarginMin_m) {
     return failure(Fault::kStartBlocked, "the arm lacks {:.0f} mm of clearance", (kMarginMin_m - margin_m) * 1e3);
   }
-  // Degrees of the last, last but one and last but two joint. The last rolls the image and hardly moves the board in it; the
-  // others pan and tilt, so they stay small. Consecutive turns differ in axis: that is what a hand-eye solution needs.
+  // Degrees of the last, last but one and last but two joint. The last rolls the image and hardly moves the board in
+  // it; the others pan and tilt, so they stay small. Consecutive turns differ in axis: that is what a hand-eye solution
+  // needs.
   constexpr std::array<std::array<double, 3>, 10> kTurns{{{25, 0, 0},
                                                           {0, 10, 0},
                                                           {0, 0, 10},
@@ -188,7 +187,8 @@ Result<Turns> bootstrap_views(const ArmModel& arm, const Body& body, const FreeS
   Turns views;
   for (const auto& turn : kTurns) {
     JointVector q = at;
-    for (int i = 0; i < 3 && i < arm.joints; ++i) q[arm.joints - 1 - i] += turn[static_cast<std::size_t>(i)] * kDegree_rad;
+    for (int i = 0; i < 3 && i < arm.joints; ++i)
+      q[arm.joints - 1 - i] += turn[static_cast<std::size_t>(i)] * kDegree_rad;
     if (certify(arm, body, space, clearance, at, q).certified()) views.push_back(q);
   }
   return views;

@@ -12,30 +12,30 @@ namespace firstlook {
 /// References to things that must outlive the call.
 struct CalibrationViewInputs {
   const ArmModel& arm;
-  const Body& body;         ///< with the envelope of an unknown camera
-  const FreeSpace& space;   ///< the safe zone
+  const Body& body;        ///< with the envelope of an unknown camera
+  const FreeSpace& space;  ///< the safe zone
   const Clearance& clearance;
-  const ViewDesignModel& model;          ///< a rough hand-eye and board pose will do
-  const Matrix12d& information;          ///< prior_information() plus view_information() of each view taken
-  std::span<const JointVector> taken;    ///< configurations of the views taken
+  const ViewDesignModel& model;        ///< a rough hand-eye and board pose will do
+  const Matrix12d& information;        ///< prior_information() plus view_information() of each view taken
+  std::span<const JointVector> taken;  ///< configurations of the views taken
 };
 
 struct CalibrationViewOptions {
   std::uint64_t seed = 1;
-  std::uint32_t step = 0;         ///< number of this choice: other candidates each time
-  int random_draws = 3000;        ///< uniform configurations: 1 in 1000 sees the board
-  int nearby_draws = 1000;        ///< around the views taken
-  int aimed_draws = 1500;         ///< camera poses that look at the board
-  ViewLimits limits;              ///< margin, tilt and distance at which the whole board must be seen
-  double distance_min_m = 0.35;   ///< of aimed poses: from near by corners tell most (FACTS 2)
+  std::uint32_t step = 0;        ///< number of this choice: other candidates each time
+  int random_draws = 3000;       ///< uniform configurations: 1 in 1000 sees the board
+  int nearby_draws = 1000;       ///< around the views taken
+  int aimed_draws = 1500;        ///< camera poses that look at the board
+  ViewLimits limits;             ///< margin, tilt and distance at which the whole board must be seen
+  double distance_min_m = 0.35;  ///< of aimed poses: from near by corners tell most (FACTS 2)
   double distance_max_m = 0.8;
-  double tilt_max_rad = 0.785;    ///< of aimed poses: 45 degrees
+  double tilt_max_rad = 0.785;     ///< of aimed poses: 45 degrees
   double different_min_rad = 0.1;  ///< some joint must differ so much from every view taken
-  double cost_lever_m = 1.0;      ///< design_cost: rotation counts as displacement at this distance
-  double cost_drop_min = 0.005;   ///< a view must lower the cost by this share
-  int plans_max = 12;             ///< best candidates that the planner may try
+  double cost_lever_m = 1.0;       ///< design_cost: rotation counts as displacement at this distance
+  double cost_drop_min = 0.005;    ///< a view must lower the cost by this share
+  int plans_max = 12;              ///< best candidates that the planner may try
   int plan_iterations_max = 600;
-  SpeedLimits speed;              ///< for the path's duration
+  SpeedLimits speed;  ///< for the path's duration
 };
 
 struct CalibrationViewChoice {
@@ -46,11 +46,11 @@ struct CalibrationViewChoice {
   };
   Outcome outcome = Outcome::kNoneFeasible;
   JointVector target;
-  Path path;            ///< certified, from the current configuration
+  Path path;                           ///< certified, from the current configuration
   Matrix6d before = Matrix6d::Zero();  ///< predicted covariance of flange_T_camera from the views taken
   Matrix6d after = Matrix6d::Zero();   ///< and with this view
-  int considered = 0;   ///< configurations looked at
-  int feasible = 0;     ///< of them free, with the whole board in view, not hidden by the arm
+  int considered = 0;                  ///< configurations looked at
+  int feasible = 0;                    ///< of them free, with the whole board in view, not hidden by the arm
 };
 
 /// Square root of the trace of the translation part (m) and of the rotation part (rad): norms over the axes.
@@ -62,8 +62,8 @@ struct PredictedSigma {
 
 /// The reachable view with the smallest A-optimal cost. The same arguments give the same choice.
 /// Errors: kStartBlocked when `current` is not free.
-[[nodiscard]] Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs& inputs,
-                                                                  Planner& planner, const JointVector& current,
+[[nodiscard]] Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs& inputs, Planner& planner,
+                                                                  const JointVector& current,
                                                                   const CalibrationViewOptions& options = {});
 
 /// Whether the arm comes between the camera and one of the board's outer corners. Capsules that contain the camera (its
@@ -71,8 +71,8 @@ struct PredictedSigma {
 [[nodiscard]] bool hides_board(const ViewDesignModel& model, const Capsules& body_in_base,
                                const Transform<Base, Flange>& base_T_flange);
 
-/// The first views, while nothing is known of the hand-eye transform: small turns of the outer joints about different axes
-/// around `at`, where the board was seen whole. Straight moves from `at` are certified; others are left out.
+/// The first views, while nothing is known of the hand-eye transform: small turns of the outer joints about different
+/// axes around `at`, where the board was seen whole. Straight moves from `at` are certified; others are left out.
 /// Errors: kStartBlocked when `at` is not free.
 [[nodiscard]] Result<Turns> bootstrap_views(const ArmModel& arm, const Body& body, const FreeSpace& space,
                                             const Clearance& clearance, const JointVector& at);

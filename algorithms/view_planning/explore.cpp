@@ -131,8 +131,7 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
 }
 
 bool ViewChooser::worthwhile(const Candidate& candidate, const ExploreOptions& options) const {
-  return candidate.free &&
-         (candidate.gain.unknown >= options.gain_min || candidate.gain.again >= options.again_min);
+  return candidate.free && (candidate.gain.unknown >= options.gain_min || candidate.gain.again >= options.again_min);
 }
 
 void ViewChooser::score(const Task& task, RunParallel run_parallel) {
@@ -209,8 +208,7 @@ bool ViewChooser::can_move(const Task& task) const {
   const ViewContext& c = task.context;
   const auto last = candidates_.begin() + 2 * task.samples;
   return std::any_of(candidates_.begin(), last, [&](const Candidate& candidate) {
-    return candidate.free &&
-           certify(c.arm, c.body, c.space, c.clearance, task.current, candidate.q).certified();
+    return candidate.free && certify(c.arm, c.body, c.space, c.clearance, task.current, candidate.q).certified();
   });
 }
 
@@ -221,13 +219,12 @@ void ViewChooser::certify_end(const Task& task, ViewChoice& choice) const {
     const Candidate& candidate = candidates_[static_cast<std::size_t>(i)];
     if (!candidate.free) continue;
     ++(i < task.samples ? certificate.random_samples : certificate.aimed_samples);
-    if (worthwhile(candidate, task.options)) {
-      ++certificate.unreached;
-    } else {
+    if (!worthwhile(candidate, task.options)) {
       certificate.gain_best = std::max(certificate.gain_best, candidate.gain.unknown);
     }
   }
-  certificate.clusters = static_cast<int>(find_remaining(task.context.map, task.context.zone, task.options.gain_min).size());
+  certificate.clusters =
+      static_cast<int>(find_remaining(task.context.map, task.context.zone, task.options.gain_min).size());
   choice.outcome = can_move(task) ? ViewChoice::Outcome::kComplete : ViewChoice::Outcome::kNothingReachable;
 }
 
@@ -255,6 +252,7 @@ Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVe
     choice.worthwhile += static_cast<int>(order_.size());
     if (Status planned = plan_best(task, choice); !planned) return std::unexpected(planned.error());
     if (choice.outcome == ViewChoice::Outcome::kChosen) return choice;
+    choice.certificate.unreached += static_cast<int>(order_.size());
   }
   certify_end(task, choice);
   return choice;

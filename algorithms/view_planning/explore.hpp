@@ -12,24 +12,24 @@ namespace firstlook {
 
 struct ExploreOptions {
   std::uint64_t seed = 1;
-  std::uint32_t step = 0;              ///< number of this choice: other candidates each time
-  int tries_per_candidate = 40;        ///< random configurations drawn for one that is free
-  std::uint32_t gain_min = 8;          ///< unknown voxels that make a view worth it (k of the certificate)
-  std::uint32_t again_min = 100;       ///< or voxels that it makes usable for motion
-  int plans_max = 24;                  ///< candidates that the planner may try; twice as many for the certificate
-  int plan_iterations_max = 400;       ///< for one of them
-  int certificate_samples = 2000;      ///< random configurations, and as many aimed at the frontier
+  std::uint32_t step = 0;          ///< number of this choice: other candidates each time
+  int tries_per_candidate = 40;    ///< random configurations drawn for one that is free
+  std::uint32_t gain_min = 8;      ///< unknown voxels that make a view worth it (k of the certificate)
+  std::uint32_t again_min = 100;   ///< or voxels that it makes usable for motion
+  int plans_max = 24;              ///< candidates that the planner may try; twice as many for the certificate
+  int plan_iterations_max = 400;   ///< for one of them
+  int certificate_samples = 2000;  ///< random configurations, and as many aimed at the frontier
   ViewTiming timing;
 };
 
 /// Why exploration ends: every sampled view that can be reached sees fewer than `gain_min` unknown voxels.
 struct TerminationCertificate {
-  int random_samples = 0;     ///< free configurations drawn at random
-  int aimed_samples = 0;      ///< free configurations aimed at frontier voxels
+  int random_samples = 0;  ///< free configurations drawn at random
+  int aimed_samples = 0;   ///< free configurations aimed at frontier voxels
   std::uint32_t gain_min = 0;
-  std::uint32_t gain_best = 0;   ///< of all samples that can be reached
-  int unreached = 0;             ///< samples that would see enough, but no certified path was found that leads there
-  int clusters = 0;              ///< unknown clusters that touch free space
+  std::uint32_t gain_best = 0;  ///< of all samples that can be reached
+  int unreached = 0;            ///< samples that would see enough, but none of the plans tried leads there
+  int clusters = 0;             ///< unknown clusters that touch free space
 };
 
 struct ViewChoice {

@@ -65,9 +65,15 @@ void GainModel::prepare(const ViewContext& context) {
     const bool counts = context.zone[i] != 0;
     const bool futile = futile_.count(i) >= sampling_.futile_max;
     switch (context.map.voxel_class(i)) {
-      case VoxelClass::kOccupied: plane_[i] = kOpaque; break;
-      case VoxelClass::kUnknown: plane_[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight; break;
-      case VoxelClass::kFree: plane_[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass; break;
+      case VoxelClass::kOccupied:
+        plane_[i] = kOpaque;
+        break;
+      case VoxelClass::kUnknown:
+        plane_[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight;
+        break;
+      case VoxelClass::kFree:
+        plane_[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass;
+        break;
     }
   }
   find_frontier(context);

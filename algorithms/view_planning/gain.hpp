@@ -17,8 +17,9 @@ struct GainSampling {
   int futile_max = 3;  ///< looks without result after which a voxel is taken to be solid or to give no return
 };
 
-/// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark surface).
-/// Without it a voxel that the sensor cannot resolve would attract the arm forever. Memory is taken at construction.
+/// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark
+/// surface). Without it a voxel that the sensor cannot resolve would attract the arm forever. Memory is taken at
+/// construction.
 class FutileLooks {
  public:
   explicit FutileLooks(const GridGeometry& geometry) : count_(geometry.count(), 0) {}

@@ -8,9 +8,9 @@
 
 namespace firstlook {
 
-/// Calls visit(index, entry) for each voxel of the grid that the segment from `from_m` to `to_m` passes, in order, until it
-/// returns false; entry in [0, 1] is where the segment enters the voxel. Voxels outside the grid are passed silently.
-/// Amanatides and Woo 1987, "A fast voxel traversal algorithm for ray tracing".
+/// Calls visit(index, entry) for each voxel of the grid that the segment from `from_m` to `to_m` passes, in order,
+/// until it returns false; entry in [0, 1] is where the segment enters the voxel. Voxels outside the grid are passed
+/// silently. Amanatides and Woo 1987, "A fast voxel traversal algorithm for ray tracing".
 template <typename Visit>
 void walk_ray(const GridGeometry& geometry, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m, Visit&& visit) {
   const Eigen::Vector3d delta = to_m - from_m;

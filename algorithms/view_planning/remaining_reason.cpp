@@ -12,9 +12,9 @@
 namespace firstlook {
 namespace {
 
-constexpr std::uint64_t kStream = 4700;    // of random numbers
+constexpr std::uint64_t kStream = 4700;      // of random numbers
 constexpr double kFieldDistanceMax_m = 0.5;  // only whether a body fits matters, not how well
-constexpr int kAimedTries = 16;            // directions from which each voxel is tried
+constexpr int kAimedTries = 16;              // directions from which each voxel is tried
 
 /// Space and configurations as they could be at best: everything free that is not occupied, blocked or kept out.
 struct Optimist {
@@ -73,7 +73,8 @@ void sample_views(Optimist& o, const ReasonOptions& options, Random& random) {
     JointVector q = JointVector::zero(arm.joints);
     for (int j = 0; j < arm.joints; ++j) {
       const auto i = static_cast<std::size_t>(j);
-      q[j] = random.uniform(std::max(arm.lower_rad[i], -std::numbers::pi), std::min(arm.upper_rad[i], std::numbers::pi));
+      q[j] =
+          random.uniform(std::max(arm.lower_rad[i], -std::numbers::pi), std::min(arm.upper_rad[i], std::numbers::pi));
     }
     if (o.fits(q)) o.views.push_back(forward(arm, q).flange() * o.context.flange_T_depth);
   }
@@ -108,9 +109,12 @@ RemainingReason reason_of(const Optimist& o, const GainModel& gain, std::uint32_
   }
   if (best != Sight::kGood) best = std::max(best, aimed_sight(o, point, voxel, random));
   switch (best) {
-    case Sight::kGood: return RemainingReason::kOutOfReach;
-    case Sight::kBadRange: return RemainingReason::kOutOfRange;
-    case Sight::kNone: break;
+    case Sight::kGood:
+      return RemainingReason::kOutOfReach;
+    case Sight::kBadRange:
+      return RemainingReason::kOutOfRange;
+    case Sight::kNone:
+      break;
   }
   return RemainingReason::kOccluded;
 }
@@ -119,10 +123,14 @@ RemainingReason reason_of(const Optimist& o, const GainModel& gain, std::uint32_
 
 std::string_view to_string(RemainingReason reason) {
   switch (reason) {
-    case RemainingReason::kOccluded: return "occluded";
-    case RemainingReason::kOutOfRange: return "out_of_range";
-    case RemainingReason::kOutOfReach: return "out_of_reach";
-    case RemainingReason::kNoReturn: return "no_return";
+    case RemainingReason::kOccluded:
+      return "occluded";
+    case RemainingReason::kOutOfRange:
+      return "out_of_range";
+    case RemainingReason::kOutOfReach:
+      return "out_of_reach";
+    case RemainingReason::kNoReturn:
+      return "no_return";
   }
   return "occluded";
 }

@@ -27,12 +27,12 @@ struct RemainingEntry {
 
 struct ReasonOptions {
   std::uint64_t seed = 1;
-  int configurations = 600;   ///< inside the joint limits and clear of the arm itself, wherever they are
+  int configurations = 600;     ///< inside the joint limits and clear of the arm itself, wherever they are
   int voxels_per_cluster = 24;  ///< frontier voxels tested, evenly spread
 };
 
-/// One entry for each cluster, in their order. Each tested frontier voxel votes: no_return when its looks were futile; else
-/// by whether any sampled configuration, ignoring what is known to be free, has it in view at a good range
+/// One entry for each cluster, in their order. Each tested frontier voxel votes: no_return when its looks were futile;
+/// else by whether any sampled configuration, ignoring what is known to be free, has it in view at a good range
 /// (out_of_reach), in view at a bad range only (out_of_range), or not at all (occluded). The most votes win.
 [[nodiscard]] std::vector<RemainingEntry> explain_remaining(const ViewContext& context, const GainModel& gain,
                                                             std::span<const UnknownCluster> clusters,

@@ -1,6 +1,7 @@
 #include "algorithms/view_planning/sweep.hpp"
 
 #include <array>
+#include <cmath>
 
 namespace firstlook {
 namespace {
@@ -26,16 +27,18 @@ Result<SweepStep> next_sweep_step(SweepProgress& progress, const ViewContext& co
   planning.seed = options.seed;
   planning.iterations_max = options.iterations_max;
   planning.limits = options.limits;
-  if (const Status begun = planner.begin(context.arm, context.body, context.space, context.clearance, current, planning);
+  if (const Status begun =
+          planner.begin(context.arm, context.body, context.space, context.clearance, current, planning);
       !begun) {
     return std::unexpected(begun.error());
   }
   gain.prepare(context);
+  const double voxel_m3 = std::pow(context.map.geometry().resolution_m, 3);
   for (std::size_t i = 0; i < progress.steps.size(); ++i) {
     if (progress.done[i] != 0) continue;
     const JointVector& target = progress.steps[i];
     const ViewGain expected = gain.count(context, target, worker);
-    if (expected.unknown < options.gain_min) {
+    if (expected.unknown * voxel_m3 < options.gain_min_m3) {
       progress.done[i] = 1;
       continue;
     }

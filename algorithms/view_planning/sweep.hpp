@@ -9,11 +9,11 @@
 namespace firstlook {
 
 struct SweepOptions {
-  double step_share = 0.75;         ///< of the horizontal field of view: neighbours overlap, motion needs two looks
-  std::uint32_t gain_min = 200;     ///< unknown voxels; a step that sees fewer is left out
-  int iterations_max = 300;         ///< of the planner for one step
+  double step_share = 0.75;  ///< of the horizontal field of view: neighbours overlap, motion needs two looks
+  double gain_min_m3 = 0.1;  ///< unknown volume; a step that sees less is left to the exploration
+  int iterations_max = 300;  ///< of the planner for one step
   std::uint64_t seed = 1;
-  SpeedLimits limits;               ///< for the path's duration
+  SpeedLimits limits;  ///< for the path's duration
 };
 
 /// What has been done of a sweep. Plain data.
@@ -27,9 +27,9 @@ struct SweepProgress {
                                        const SweepOptions& options = {});
 
 struct SweepStep {
-  bool done = false;     ///< true: no step left that is worth it and can be reached; the rest is meaningless
+  bool done = false;  ///< true: no step left that is worth it and can be reached; the rest is meaningless
   JointVector target;
-  Path path;             ///< from the current configuration, certified on the current free space
+  Path path;  ///< from the current configuration, certified on the current free space
   ViewGain gain;
 };
 

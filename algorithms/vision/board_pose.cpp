@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -20,13 +22,14 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 struct Normal {
   Matrix6 jtj = Matrix6::Zero();
   Vector6 jtr = Vector6::Zero();
-  double cost = 0;  ///< sum of squared residuals, px^2
+  double cost = 0;  ///< weighted sum of squared residuals, px^2
 };
 
 struct Problem {
   const CameraIntrinsics& camera;
   const BoardSpec& board;
   std::span<const Eigen::Vector2d> corners_px;
+  std::span<const double> weights;  ///< one for each corner
 };
 
 /// Normal equations at a pose; empty when a corner has no image from there.
@@ -39,9 +42,10 @@ std::optional<Normal> linearize(const Problem& problem, const Pose& pose) {
     const Eigen::Vector2d residual = problem.corners_px[static_cast<std::size_t>(i)] - projected->pixel;
     Eigen::Matrix<double, 2, 6> j;
     j << projected->d_pixel_d_point, -projected->d_pixel_d_point * cross_matrix(turned);
-    n.jtj += j.transpose() * j;
-    n.jtr += j.transpose() * residual;
-    n.cost += residual.squaredNorm();
+    const double weight = problem.weights[static_cast<std::size_t>(i)];
+    n.jtj += weight * j.transpose() * j;
+    n.jtr += weight * j.transpose() * residual;
+    n.cost += weight * residual.squaredNorm();
   }
   return n;
 }
@@ -120,6 +124,44 @@ std::optional<Pose> start_pose(const Problem& problem) {
   return h ? pose_from_homography(*h) : std::nullopt;
 }
 
+/// `coordinates` that the cost is summed over.
+BoardPose to_board_pose(const Refined& refined, double coordinates) {
+  BoardPose result;
+  result.residual_rms_px = std::sqrt(refined.normal.cost / coordinates);
+  // Through a quaternion, so that rounding leaves no trace of scale or shear.
+  result.camera_T_board =
+      Transform<Camera, Board>(Eigen::Quaterniond(refined.pose.linear()), refined.pose.translation());
+  result.unit_covariance = refined.normal.jtj.inverse();
+  return result;
+}
+
+std::vector<double> corner_residuals(const CameraIntrinsics& camera, const BoardSpec& board,
+                                     std::span<const Eigen::Vector2d> corners_px,
+                                     const Transform<Camera, Board>& camera_T_board) {
+  constexpr double kNoImage_px = 1e9;
+  std::vector<double> lengths;
+  for (int i = 0; i < board.corners(); ++i) {
+    const auto pixel = project(camera, camera_T_board * board.corner(i));
+    lengths.push_back(pixel ? (corners_px[static_cast<std::size_t>(i)] - *pixel).norm() : kNoImage_px);
+  }
+  return lengths;
+}
+
+/// Sigma of a coordinate from the median length: 1.1774 sigmas for a Rayleigh distribution.
+std::vector<double> huber_weights(const std::vector<double>& lengths_px, double loss_scale, double sigma_min_px) {
+  constexpr double kGate = 10;  // sigmas beyond which a corner is none
+  std::vector<double> sorted = lengths_px;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double sigma_px = std::max(sigma_min_px, *middle / 1.1774);
+  std::vector<double> weights;
+  for (const double length : lengths_px) {
+    const double sigmas = length / sigma_px;
+    weights.push_back(sigmas <= loss_scale ? 1.0 : sigmas <= kGate ? loss_scale / sigmas : 0.0);
+  }
+  return weights;
+}
+
 }  // namespace
 
 Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board,
@@ -129,7 +171,8 @@ Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const Boar
   if (corners_px.size() != static_cast<std::size_t>(board.corners())) {
     return failure(Fault::kBoardNotFound, "{} corners instead of {}", corners_px.size(), board.corners());
   }
-  const Problem problem{camera, board, corners_px};
+  const std::vector<double> weights(corners_px.size(), 1.0);
+  const Problem problem{camera, board, corners_px, weights};
   const auto start = start_pose(problem);
   if (!start) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
   std::optional<Refined> best = refine(problem, *start);
@@ -137,16 +180,31 @@ Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const Boar
   if (other && (!best || other->normal.cost < best->normal.cost)) best = other;
   if (!best) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
 
-  BoardPose result;
-  result.residual_rms_px = std::sqrt(best->normal.cost / (2.0 * board.corners()));
+  const BoardPose result = to_board_pose(*best, 2.0 * board.corners());
   if (!(result.residual_rms_px <= residual_max_px)) {
     return failure(Fault::kBoardNotFound, "corners off by {:.2f} px RMS from any pose of the board",
                    result.residual_rms_px);
   }
-  // Through a quaternion, so that rounding leaves no trace of scale or shear.
-  result.camera_T_board = Transform<Camera, Board>(Eigen::Quaterniond(best->pose.linear()), best->pose.translation());
-  result.unit_covariance = best->normal.jtj.inverse();
   return result;
+}
+
+Result<RobustBoardPose> estimate_board_pose_robust(const CameraIntrinsics& camera, const BoardSpec& board,
+                                                   std::span<const Eigen::Vector2d> corners_px, double residual_max_px,
+                                                   double loss_scale, double sigma_min_px) {
+  constexpr int kRounds = 4;
+  const auto plain = estimate_board_pose(camera, board, corners_px, residual_max_px);
+  if (!plain) return std::unexpected(plain.error());
+  RobustBoardPose robust{*plain, corner_residuals(camera, board, corners_px, plain->camera_T_board), {}};
+  for (int round = 0; round < kRounds; ++round) {
+    robust.weights = huber_weights(robust.residuals_px, loss_scale, sigma_min_px);
+    const double total = std::accumulate(robust.weights.begin(), robust.weights.end(), 0.0);
+    if (total == static_cast<double>(robust.weights.size())) break;
+    const auto refined = refine({camera, board, corners_px, robust.weights}, robust.pose.camera_T_board.pose());
+    if (!refined) return failure(Fault::kBoardNotFound, "too many corners contradict each other");
+    robust.pose = to_board_pose(*refined, 2 * total);
+    robust.residuals_px = corner_residuals(camera, board, corners_px, robust.pose.camera_T_board);
+  }
+  return robust;
 }
 
 }  // namespace firstlook

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <vector>
 
 #include "algorithms/vision/checkerboard.hpp"
 #include "platform/core/camera_intrinsics.hpp"
@@ -26,5 +27,18 @@ struct BoardPose {
 [[nodiscard]] Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board,
                                                     std::span<const Eigen::Vector2d> corners_px,
                                                     double residual_max_px = 3.0);
+
+/// A pose that single wrong corners do not move.
+struct RobustBoardPose {
+  BoardPose pose;                    ///< of the weighted corners
+  std::vector<double> residuals_px;  ///< length of each corner's error
+  std::vector<double> weights;       ///< Huber's, 0 to 1; 0 beyond ten sigmas
+};
+
+/// The same, corners beyond `loss_scale` sigmas (from the median residual, at least `sigma_min_px`) weighted down.
+[[nodiscard]] Result<RobustBoardPose> estimate_board_pose_robust(const CameraIntrinsics& camera, const BoardSpec& board,
+                                                                 std::span<const Eigen::Vector2d> corners_px,
+                                                                 double residual_max_px = 5.0, double loss_scale = 3.0,
+                                                                 double sigma_min_px = 0.01);
 
 }  // namespace firstlook

@@ -59,7 +59,9 @@ void print_text(const HandEyeResult& r) {
   fmt::print("held out         board seen off by {:.2f} mm RMS\n", r.holdout_rms_m * 1e3);
   fmt::print("70 % subsets     spread {:.2f} mm  {:.2f} mrad RMS\n", r.subset_spread_m * 1e3,
              r.subset_spread_rad * 1e3);
-  fmt::print("AX = XB          {:.3f} deg {:.2f} mm RMS over all pairs of views; {:.3f} deg {:.2f} mm consecutive\n",
+  fmt::print("AX = XB          {:.3f} deg {:.2f} mm RMS, the board in base against its mean\n",
+             r.board_in_base.rotation_rms_deg, r.board_in_base.translation_rms_mm);
+  fmt::print("                 {:.3f} deg {:.2f} mm between all views, {:.3f} deg {:.2f} mm between consecutive ones\n",
              r.ax_xb_all_pairs.rotation_rms_deg, r.ax_xb_all_pairs.translation_rms_mm,
              r.ax_xb_consecutive.rotation_rms_deg, r.ax_xb_consecutive.translation_rms_mm);
   fmt::print("usable distance  {:.2f} m\n", r.usable_distance_m);

@@ -21,7 +21,7 @@ struct ConfigFlags {
     ConfigSources s;
     if (!file.empty()) s.file = file;
     s.environment = process_environment();
-    if (!cell.empty()) s.flags.push_back({"cell", "'" + cell + "'", "--cell"});
+    if (!cell.empty()) s.flags.push_back({"cell", cell, "--cell"});
     if (!seed.empty()) s.flags.push_back({"seed", seed, "--seed"});
     if (!workers.empty()) s.flags.push_back({"workers", workers, "--workers"});
     return s;

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <map>
 
+#include "algorithms/calibration/board_flips.hpp"
 #include "algorithms/calibration/intrinsics.hpp"
+#include "algorithms/vision/board_pose.hpp"
 #include "app/dataset/csv_table.hpp"
 #include "app/dataset/gray_image_file.hpp"
 
@@ -15,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kQuaternionTolerance = 1e-3;
+constexpr std::size_t kViewsMax = 500;    // work and memory of a solve grow with the square of the number of views
 constexpr double kTranslationMax_m = 10;  // no arm that carries a camera reaches farther
 
 constexpr std::array<std::string_view, 8> kPoseColumns = {"image", "x", "y", "z", "qx", "qy", "qz", "qw"};
@@ -68,12 +71,19 @@ Result<std::vector<RecordedPose>> read_poses(const fs::path& file) {
     poses.push_back({image, Transform<Base, Flange>(*pose)});
   }
   if (poses.empty()) return failure(Fault::kDataMalformed, "{}: no poses", table->file);
+  if (poses.size() > kViewsMax) {
+    return failure(Fault::kDataMalformed, "{}: {} poses, at most {} are solved", table->file, poses.size(), kViewsMax);
+  }
   return poses;
 }
 
 Result<std::vector<PosePair>> read_pairs(const fs::path& file) {
   const auto table = read_csv(file, kPairColumns);
   if (!table) return std::unexpected(table.error());
+  if (table->rows.size() > kViewsMax) {
+    return failure(Fault::kDataMalformed, "{}: {} pairs, at most {} are solved", table->file, table->rows.size(),
+                   kViewsMax);
+  }
   std::vector<PosePair> pairs;
   for (const CsvRow& row : table->rows) {
     const auto same = [&](const CsvRow& other) { return other.line < row.line && other.fields == row.fields; };
@@ -206,12 +216,6 @@ Status add_views_from_images(const fs::path& folder, const std::vector<RecordedP
   if (data.views.empty()) {
     return failure(Fault::kBoardNotFound, "in none of {} images of {}", poses.size(), folder.string());
   }
-  if (!data.board.is_orientation_unique()) {
-    data.notes.push_back(fmt::format(
-        "a {}x{} board looks the same upside down: images in which it is turned by more than 90 degrees may contradict "
-        "the others; use odd x even corners",
-        data.board.inner_columns, data.board.inner_rows));
-  }
   return {};
 }
 
@@ -245,6 +249,25 @@ Status calibrate_camera(CalibrationDataset& data) {
   return {};
 }
 
+/// Found corners of a board that looks the same upside down may begin at either end: the arm's motion tells.
+void settle_flips(CalibrationDataset& data) {
+  std::vector<PosePair> pairs;
+  for (const CalibrationView& view : data.views) {
+    const auto pose = estimate_board_pose(data.camera, data.board, view.corners_px);
+    if (!pose) return;
+    pairs.push_back({view.base_T_flange, pose->camera_T_board});
+  }
+  const std::vector<bool> flips = settle_board_flips(data.board, pairs);
+  for (std::size_t i = 0; i < flips.size(); ++i) {
+    if (flips[i]) std::reverse(data.views[i].corners_px.begin(), data.views[i].corners_px.end());
+  }
+  data.notes.push_back(fmt::format(
+      "a {}x{} board looks the same upside down: {} of {} views turned so that they agree with the arm's motion; a "
+      "board "
+      "of odd x even corners needs no guess",
+      data.board.inner_columns, data.board.inner_rows, std::count(flips.begin(), flips.end(), true), flips.size()));
+}
+
 }  // namespace
 
 Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder) {
@@ -272,6 +295,7 @@ Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder) {
   if (!camera) {
     if (const Status calibrated = calibrate_camera(data); !calibrated) return std::unexpected(calibrated.error());
   }
+  if (!with_corners && !data.board.is_orientation_unique()) settle_flips(data);
   return data;
 }
 

@@ -67,8 +67,11 @@ struct CommandRefused {
 /// SIGINT or SIGTERM, or the end of a virtual run's time.
 struct ShutdownAsked {
   static constexpr std::uint16_t kKind = 21;
+  std::uint8_t none = 0;  // a value takes at least one byte
   template <typename Archive>
-  void fields(Archive&) {}
+  void fields(Archive& a) {
+    a(none);
+  }
 };
 
 /// What the machine waits for by time. The number is the timer's on the loop.

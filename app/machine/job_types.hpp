@@ -49,9 +49,12 @@ enum class MotionPhase : std::uint8_t {
   kMapping,            ///< calibrated camera, known free space of the map
 };
 
-struct NoArguments {
+struct NoArguments {  ///< kSolve, kValidate, kSummarize
+  std::uint8_t none = 0;  // a value takes at least one byte
   template <typename Archive>
-  void fields(Archive&) {}
+  void fields(Archive& a) {
+    a(none);
+  }
 };
 
 struct FromHere {  ///< kLocateViews, kIdentifyMotions, kNextCalibrationView, kNextSweepView, kNextView

@@ -59,8 +59,11 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
                          {"rotation_mrad", result.arm_sigma.rotation_rad * 1e3}};
   object["subset_spread"] = {{"translation_mm", result.subset_spread_m * 1e3},
                              {"rotation_mrad", result.subset_spread_rad * 1e3}};
-  object["ax_xb_residual"] = {{"all_pairs", residual_json(result.ax_xb_all_pairs)},
-                              {"consecutive", residual_json(result.ax_xb_consecutive)}};
+  // At the top the usual way to state it; the other two are the residual of the equation itself.
+  json residual = residual_json(result.board_in_base);
+  residual["all_pairs"] = residual_json(result.ax_xb_all_pairs);
+  residual["consecutive"] = residual_json(result.ax_xb_consecutive);
+  object["ax_xb_residual"] = residual;
   return object;
 }
 

@@ -13,7 +13,7 @@ template <typename AppEvent>
 [[nodiscard]] Status push_event(EventQueue& queue, Instant now, const AppEvent& event) {
   std::array<std::byte, 512> bytes;
   const std::size_t size = pack(event, std::span<std::byte>(bytes));
-  ENSURE(7201, size > 0 || sizeof(AppEvent) == 1);
+  ENSURE(7201, size > 0);
   return queue.push(now, AppEvent::kKind, std::span<const std::byte>(bytes.data(), size));
 }
 

@@ -34,7 +34,7 @@ std::optional<MachineEvent> decode_event(std::uint16_t kind, std::span<const std
     case DepthFrameArrived::kKind: return as<DepthFrameArrived>(bytes);
     case OperatorActed::kKind: return as<OperatorActed>(bytes);
     case CommandRefused::kKind: return as<CommandRefused>(bytes);
-    case ShutdownAsked::kKind: return ShutdownAsked{};
+    case ShutdownAsked::kKind: return as<ShutdownAsked>(bytes);
     default: return std::nullopt;
   }
 }

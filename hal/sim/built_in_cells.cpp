@@ -7,17 +7,17 @@ namespace {
 
 constexpr std::string_view kEmpty = R"(# Nothing but walls, floor, cart and board.
 walls: {low_m: [-2.0, -1.9], high_m: [2.1, 2.0], height_m: 2.6}
-board: {center_m: [0.80, 0.18, 0.22], faces: [-0.80, -0.18, 0.45]}
+board: {center_m: [0.89, 0.45, 0.42], faces: [-0.89, -0.45, 0.35]}
 solids:
-  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.02}, position_m: [0.85, 0.19, -0.34]}
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [0.95, 0.49, -0.245]}
 )";
 
 // The thesis's (chapter 11): the arm on its table, a second table beside it, movable screens, and a box whose cut-out
 // stands for a machine opening.
 constexpr std::string_view kWorkshop = R"(walls: {low_m: [-2.2, -2.4], high_m: [2.5, 2.2], height_m: 2.6}
-board: {center_m: [0.22, 0.82, 0.22], faces: [-0.20, -0.80, 0.45]}
+board: {center_m: [-0.12, 0.99, 0.42], faces: [0.12, -0.99, 0.35]}
 solids:
-  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.02}, position_m: [0.235, 0.87, -0.34]}
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [-0.13, 1.06, -0.245]}
 
   - {name: second table, box: {size_m: [0.90, 1.30, 0.04]}, position_m: [1.10, 0.00, -0.10], color: [0.55, 0.42, 0.28]}
   - {name: table leg, box: {size_m: [0.05, 0.05, 0.73]}, position_m: [0.70, -0.60, -0.485]}
@@ -53,9 +53,9 @@ regions:
 
 constexpr std::string_view kMachineTending = R"(# A lathe with its door open, a pallet, a conveyor, a fence and a window that gives no depth.
 walls: {low_m: [-2.3, -2.0], high_m: [2.4, 2.3], height_m: 2.8}
-board: {center_m: [0.10, -0.84, 0.20], faces: [-0.08, 0.80, 0.45]}
+board: {center_m: [0.17, -0.98, 0.42], faces: [-0.17, 0.98, 0.35]}
 solids:
-  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.00}, position_m: [0.106, -0.89, -0.35]}
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [0.19, -1.05, -0.245]}
 
   # The machine: a front wall with a door of 0.60 x 0.55, a chamber 0.5 deep behind it.
   - {name: machine below, box: {size_m: [0.60, 1.40, 0.85]}, position_m: [1.05, 0.25, -0.425], color: [0.75, 0.76, 0.74]}
@@ -81,9 +81,9 @@ regions:
 
 constexpr std::string_view kCluttered = R"(# Many things close around the arm.
 walls: {low_m: [-1.9, -1.8], high_m: [1.9, 1.8], height_m: 2.5}
-board: {center_m: [-0.66, 0.50, 0.22], faces: [0.64, -0.48, 0.45]}
+board: {center_m: [-0.74, 0.67, 0.42], faces: [0.74, -0.67, 0.35]}
 solids:
-  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.00}, position_m: [-0.70, 0.53, -0.35]}
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [-0.80, 0.72, -0.245]}
   - {name: bench, box: {size_m: [0.60, 1.60, 0.05]}, position_m: [0.95, 0.00, -0.12], color: [0.55, 0.42, 0.28]}
   - {name: bench side, box: {size_m: [0.50, 0.05, 0.70]}, position_m: [0.95, -0.70, -0.50]}
   - {name: bench side, box: {size_m: [0.50, 0.05, 0.70]}, position_m: [0.95, 0.70, -0.50]}
@@ -103,9 +103,9 @@ regions:
 )";
 
 constexpr std::string_view kHall = R"(# An open hall: no wall within the sensor's range, so most pixels get nothing back.
-board: {center_m: [0.78, -0.24, 0.22], faces: [-0.78, 0.24, 0.45]}
+board: {center_m: [0.99, -0.16, 0.42], faces: [-0.99, 0.16, 0.35]}
 solids:
-  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.02}, position_m: [0.83, -0.255, -0.34]}
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [1.06, -0.17, -0.245]}
   - {name: pallet, box: {size_m: [1.20, 0.80, 0.14]}, position_m: [-1.40, 0.60, -0.78], color: [0.58, 0.45, 0.28]}
   - {name: column, cylinder: {radius_m: 0.20, height_m: 6.0}, position_m: [2.20, 2.40, 2.15], color: [0.6, 0.6, 0.58]}
 )";

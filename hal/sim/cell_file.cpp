@@ -331,6 +331,7 @@ void read_light(const Section& cell, Scene& scene) {
   const Section light(cell.file(), cell.child("light"), "light", {"toward", "ambient", "directed", "gradient_per_m"});
   scene.light.toward = light.vector_or("toward", scene.light.toward, -1, 1);
   if (scene.light.toward.norm() < 1e-6) light.fail(light.child("toward"), "light.toward must not be zero");
+  scene.light.toward.normalize();
   scene.light.ambient = light.number_or("ambient", scene.light.ambient, 0, 1);
   scene.light.directed = light.number_or("directed", scene.light.directed, 0, 1);
   scene.light.gradient_per_m = light.vector_or("gradient_per_m", scene.light.gradient_per_m, -1, 1);

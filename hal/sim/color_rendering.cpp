@@ -171,8 +171,13 @@ class ColorFrame {
 
   [[nodiscard]] float integrate_board(int c, int r) const {
     float sum = 0;
-    spread(c, r, kBoardSamples, [&](double x, double y) { sum += look_at_board(x, y).gray; });
-    return sum / (kBoardSamples * kBoardSamples);
+    spread(c, r, kBoardSamples, [&](double x, double y) {
+      const Vector3d at = on_board(x, y);
+      sum += board_reflectance(scene_.board, at.x(), at.y());
+    });
+    const std::size_t pixel = rays_.index(c, r);
+    const Vector3d point = scene_.board.base_T_board * on_board(rays_.x[pixel], rays_.y[pixel]);
+    return brightness(sum / (kBoardSamples * kBoardSamples), point, board_normal_);
   }
 
   [[nodiscard]] float integrate_traced(int c, int r, RayRow& row) const {
@@ -239,7 +244,7 @@ float board_reflectance(const BoardPlacement& board, double x_m, double y_m) {
 }
 
 double shade(const Light& light, double reflectance, const Vector3d& point_m, const Vector3d& normal) {
-  const double falling = light.ambient + light.directed * std::max(0.0, normal.dot(light.toward.normalized()));
+  const double falling = light.ambient + light.directed * std::max(0.0, normal.dot(light.toward));
   return reflectance * falling * std::max(0.0, 1 + light.gradient_per_m.dot(point_m));
 }
 

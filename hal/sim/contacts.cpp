@@ -79,8 +79,8 @@ bool ContactMonitor::exempt(const Capsule& placed) const {
 }
 
 void ContactMonitor::check_contact(const Capsules& placed) {
-  const bool touching = std::ranges::any_of(
-      placed, [&](const Capsule& capsule) { return !exempt(capsule) && world_->touches(capsule); });
+  const bool touching =
+      std::ranges::any_of(placed, [&](const Capsule& capsule) { return !exempt(capsule) && world_->touches(capsule); });
   if (touching && !in_contact_) ++contacts_;
   in_contact_ = touching;
 }
@@ -124,9 +124,11 @@ void ContactMonitor::occupy(const Capsule& placed, const Eigen::Vector3i& voxel,
   std::uint32_t& last = overlapped_[index];
   if (last == check_number_) return;  // by another capsule
   const bool entered = last + 1 != check_number_;
+  const bool known = !entered || view_->free_for_motion(index);
+  // Excused for the part that overlaps it now; asked again for every other capsule and at every check.
+  if (!known && view_->zone_intact() && in_zone(placed, voxel)) return;
   last = check_number_;
-  if (!entered || view_->free_for_motion(index)) return;
-  if (!view_->zone_intact() || !in_zone(placed, voxel)) ++unknown_entries_;
+  if (!known) ++unknown_entries_;
 }
 
 }  // namespace firstlook::sim

@@ -13,18 +13,20 @@
 
 namespace firstlook::sim {
 
-inline constexpr double kBodyStep_m = 0.002;          ///< no body point moves farther between two checks
-inline constexpr double kOverlapTolerance_m = 1e-6;   ///< less than this is rounding, not an entry
+inline constexpr double kBodyStep_m = 0.002;         ///< no body point moves farther between two checks
+inline constexpr double kOverlapTolerance_m = 1e-6;  ///< less than this is rounding, not an entry
 
 /// The camera's housing as it is: a Kinect is 0.28 m wide along x of the colour camera and 0.07 m deep.
 [[nodiscard]] Capsule true_housing(int link, const Pose& link_T_camera);
 
-/// The arm's true geometry and that of the camera on one of its links, in link frames; link 0: the camera is not on the arm.
+/// The arm's true geometry and that of the camera on one of its links, in link frames; link 0: the camera is not on the
+/// arm.
 [[nodiscard]] Capsules true_capsules(const ArmModel& arm, int link, const Pose& link_T_camera);
 
 class ContactMonitor final : public BodyWatcher {
  public:
-  /// Links 0 and 1 are exempt while they stay inside the allowance, as for planner and guardian. The world must outlive it.
+  /// Links 0 and 1 are exempt while they stay inside the allowance, as for planner and guardian. The world must outlive
+  /// it.
   ContactMonitor(const ArmModel& arm, const Capsules& body, const BaseAllowance& allowance, const SafeZone& zone,
                  const TrueWorld& world);
 
@@ -55,11 +57,12 @@ class ContactMonitor final : public BodyWatcher {
   const TrueWorld* world_;
   const KnownFreeView* view_ = nullptr;
 
-  Capsules last_;                          ///< where the body was at the last check; empty before the first
-  std::vector<std::uint32_t> overlapped_;  ///< for each voxel the number of the last check in which the body overlapped it
+  Capsules last_;  ///< where the body was at the last check; empty before the first
+  std::vector<std::uint32_t>
+      overlapped_;  ///< for each voxel the number of the last check in which the body overlapped it
   std::uint32_t check_number_ = 1;
   bool in_contact_ = false;
-  bool outside_ = false;                   ///< of the zone, or of the grid
+  bool outside_ = false;  ///< of the zone, or of the grid
   std::uint64_t contacts_ = 0;
   std::uint64_t unknown_entries_ = 0;
   std::uint64_t checks_ = 0;

@@ -14,8 +14,8 @@ enum class Kind : unsigned char { kShare, kTime, kOffset, kSwitch, kInterval };
 struct Knob {
   std::string_view name;
   Kind kind;
-  double Faults::*value = nullptr;
-  bool Faults::*flag = nullptr;
+  double Faults::* value = nullptr;
+  bool Faults::* flag = nullptr;
 };
 
 constexpr std::array kKnobs = {

@@ -13,21 +13,21 @@ namespace firstlook::sim {
 
 struct FrameTiming {
   Duration period = milliseconds(33);
-  Instant first{};                     ///< middle of the first exposure
+  Instant first{};                       ///< middle of the first exposure
   Duration transfer = milliseconds(16);  ///< until a frame is delivered: one USB frame time and the driver's copy
   double drop_share = 0;
-  double stall_s = 0;                  ///< no frame from here on
-  double freeze_s = 0;                 ///< from here on the picture before
-  double clock_offset_s = 0;           ///< added to the stamps
+  double stall_s = 0;         ///< no frame from here on
+  double freeze_s = 0;        ///< from here on the picture before
+  double clock_offset_s = 0;  ///< added to the stamps
   std::uint64_t seed = 1;
   std::uint64_t drop_stream = 0;
 };
 
 /// What a frame shows, fixed at its exposure; rendered only when somebody reads it.
 struct ExposedFrame {
-  std::uint32_t sequence = 0;   ///< of the frame that holds it
-  std::uint32_t picture = 0;    ///< number of the exposure that is shown; seeds its noise
-  Instant exposed{};            ///< in true time
+  std::uint32_t sequence = 0;  ///< of the frame that holds it
+  std::uint32_t picture = 0;   ///< number of the exposure that is shown; seeds its noise
+  Instant exposed{};           ///< in true time
   JointVector true_joints_rad;
   bool used = false;
 };

@@ -24,8 +24,8 @@ class KnownFreeView {
   [[nodiscard]] virtual const GridGeometry& geometry() const = 0;
   /// True where the body may be at this moment: known free, or intact safe zone.
   [[nodiscard]] virtual bool free_for_motion(std::size_t voxel) const = 0;
-  /// True while no hit has revoked any part of the safe zone: then what lies inside its cylinder is free, also where the
-  /// cylinder cuts through a voxel.
+  /// True while no hit has revoked any part of the safe zone: then what lies inside its cylinder is free, also where
+  /// the cylinder cuts through a voxel.
   [[nodiscard]] virtual bool zone_intact() const { return false; }
 };
 
@@ -35,9 +35,9 @@ struct FinalClaims {
   /// Translation m, rotation rad; left perturbation in the flange frame: R = Exp(d_r) R_estimate, t = t_estimate + d_t.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   const VoxelMap* map = nullptr;
-  double now_s = 0;               ///< for the age of what is known free
+  double now_s = 0;  ///< for the age of what is known free
   double free_max_age_s = 600;
-  ObservableOptions observable;   ///< the run's own clearance and sensor limits
+  ObservableOptions observable;  ///< the run's own clearance and sensor limits
 };
 
 /// Known share of the observable voxels inside a region that the cell names (behind the screens, inside the box).

@@ -9,8 +9,8 @@
 namespace firstlook::sim {
 namespace {
 
-// After a stop the flange swings about its rest: the deflection a / w² of the last deceleration, at most 1.2 mrad, decays
-// with 0.12 s. A UR5's flange, 0.9 m from the base axis, starts at 1.1 mm and is below 0.1 mm after 0.3 s.
+// After a stop the flange swings about its rest: the deflection a / w² of the last deceleration, at most 1.2 mrad,
+// decays with 0.12 s. A UR5's flange, 0.9 m from the base axis, starts at 1.1 mm and is below 0.1 mm after 0.3 s.
 constexpr double kRing_rad_s = 2 * std::numbers::pi * 6;
 constexpr double kRingDecay_s = 0.12;
 constexpr double kRingMax_rad = 1.2e-3;
@@ -18,9 +18,7 @@ constexpr double kRingForgotten_s = 2;
 
 }  // namespace
 
-double JointMotion::duration_s() const {
-  return phases[0].duration_s + phases[1].duration_s + phases[2].duration_s;
-}
+double JointMotion::duration_s() const { return phases[0].duration_s + phases[1].duration_s + phases[2].duration_s; }
 
 bool JointMotion::moving(Instant now) const { return (now - start).seconds() < duration_s(); }
 

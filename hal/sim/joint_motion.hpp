@@ -13,8 +13,8 @@ namespace firstlook::sim {
 struct JointMotion {
   struct Phase {
     double duration_s = 0;
-    double s = 0;             ///< at its begin
-    double rate_1_s = 0;      ///< at its begin
+    double s = 0;         ///< at its begin
+    double rate_1_s = 0;  ///< at its begin
     double acceleration_1_s2 = 0;
   };
 
@@ -39,10 +39,10 @@ struct JointMotion {
 /// Stands still.
 [[nodiscard]] JointMotion rest(Instant start, const JointVector& at_rad);
 
-/// movej without blend: the leading joint (longest way) runs a trapezoid, or a triangle when the way is short, of the given
-/// speed and acceleration; all others are scaled to it. Positive speed and acceleration.
-[[nodiscard]] JointMotion movej(Instant start, const JointVector& from_rad, const JointVector& to_rad, double speed_rad_s,
-                                double acceleration_rad_s2);
+/// movej without blend: the leading joint (longest way) runs a trapezoid, or a triangle when the way is short, of the
+/// given speed and acceleration; all others are scaled to it. Positive speed and acceleration.
+[[nodiscard]] JointMotion movej(Instant start, const JointVector& from_rad, const JointVector& to_rad,
+                                double speed_rad_s, double acceleration_rad_s2);
 
 /// Brakes on the path of `motion` from where it is at `now`, every joint within its own deceleration (rad/s²).
 [[nodiscard]] JointMotion brake_on_path(const JointMotion& motion, Instant now,

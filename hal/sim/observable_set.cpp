@@ -9,18 +9,18 @@
 #include "algorithms/mapping/distance_field.hpp"
 #include "algorithms/mapping/reach_zone.hpp"
 #include "algorithms/motion/certificate.hpp"
-#include "hal/sim/ray_geometry.hpp"
 #include "hal/sim/random_streams.hpp"
+#include "hal/sim/ray_geometry.hpp"
 #include "platform/core/ensure.hpp"
 #include "platform/core/random.hpp"
 
 namespace firstlook::sim {
 namespace {
 
-constexpr double kFieldMax_m = 0.6;     // farther obstacles do not matter for an edge
+constexpr double kFieldMax_m = 0.6;         // farther obstacles do not matter for an edge
 constexpr double kRaySpacing_voxels = 0.8;  // between neighbouring rays where they end
 constexpr int kRoundsMax = 40;
-constexpr int kGrownShare = 3;          // one of three samples is drawn near what was reached with the others
+constexpr int kGrownShare = 3;  // one of three samples is drawn near what was reached with the others
 constexpr double kGrownSigma_rad = 0.35;
 
 /// One configuration of the roadmap.
@@ -42,7 +42,8 @@ std::vector<Eigen::Vector3d> sensor_rays(const CameraIntrinsics& sensor, double 
   rays.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      rays.emplace_back(left + (right - left) * (column + 0.5) / columns, top + (bottom - top) * (row + 0.5) / rows, 1.0);
+      rays.emplace_back(left + (right - left) * (column + 0.5) / columns, top + (bottom - top) * (row + 0.5) / rows,
+                        1.0);
     }
   }
   return rays;
@@ -181,7 +182,8 @@ class Fixpoint {
     }
   }
 
-  /// Is there a certified edge from one of the nearest reached nodes? Only from those reached in `pass`, unless it is -1.
+  /// Is there a certified edge from one of the nearest reached nodes? Only from those reached in `pass`, unless it is
+  /// -1.
   [[nodiscard]] bool connects(const JointVector& q_rad, int pass) const {
     std::vector<std::pair<double, int>> near;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -201,7 +203,8 @@ class Fixpoint {
   bool look_from_reached() {
     std::vector<int> fresh;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (nodes_[i].reached && !std::exchange(nodes_[i].looked, nodes_[i].reached)) fresh.push_back(static_cast<int>(i));
+      if (nodes_[i].reached && !std::exchange(nodes_[i].looked, nodes_[i].reached))
+        fresh.push_back(static_cast<int>(i));
     }
     workers_.parallel_for(static_cast<int>(fresh.size()), [&](int index, int worker) {
       look(nodes_[static_cast<std::size_t>(fresh[static_cast<std::size_t>(index)])].q_rad,
@@ -248,10 +251,10 @@ class Fixpoint {
     return own;
   }
 
-  static bool hides(const Capsules& own, const Eigen::Vector3d& eye, const Eigen::Vector3d& direction, double before_m) {
-    return std::ranges::any_of(own, [&](const Capsule& capsule) {
-      return ray_to_capsule_m(eye, direction, capsule) < before_m;
-    });
+  static bool hides(const Capsules& own, const Eigen::Vector3d& eye, const Eigen::Vector3d& direction,
+                    double before_m) {
+    return std::ranges::any_of(
+        own, [&](const Capsule& capsule) { return ray_to_capsule_m(eye, direction, capsule) < before_m; });
   }
 
   void finish(ObservableSet& result) const {

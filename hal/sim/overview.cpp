@@ -17,7 +17,7 @@ class OverviewPainter {
  public:
   OverviewPainter(const Scene& scene, const RayTracer& tracer, const Capsules& body, const Pose& base_T_eye)
       : scene_(scene), tracer_(tracer), base_T_eye_(base_T_eye), body_(body),
-        seen_body_(body, base_T_eye, base_T_eye.translation()), toward_(scene.light.toward.normalized()) {}
+        seen_body_(body, base_T_eye, base_T_eye.translation()), toward_(scene.light.toward) {}
 
   [[nodiscard]] Vector3d paint(const RayRow& row, std::size_t i, double x, double y) const {
     constexpr double kSky = 0.93;

@@ -34,9 +34,9 @@ Transform<Flange, Flange> PoseDeviation::at(const JointVector& q_rad) const {
   const Eigen::Vector3d translation_m = Eigen::Vector3d(unit[0], unit[1], unit[2]) * sigmas_.translation_m;
   const Eigen::Vector3d turn_rad = Eigen::Vector3d(unit[3], unit[4], unit[5]) * sigmas_.rotation_rad;
   const double angle_rad = turn_rad.norm();
-  const Eigen::Quaterniond rotation =
-      angle_rad > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad))
-                    : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond rotation = angle_rad > 0
+                                          ? Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad))
+                                          : Eigen::Quaterniond::Identity();
   return Transform<Flange, Flange>(rotation, translation_m);
 }
 

@@ -22,8 +22,9 @@ constexpr double kClearance_m = 0.05;        // of a view to the zone's surface:
 constexpr double kViewTiltMax_rad = 50 * kPi / 180, kViewTiltMin_rad = 10 * kPi / 180;
 constexpr double kDiverse_rad = 20 * kPi / 180;
 constexpr int kDrawsMax = 64, kPlaceTriesMax = 50, kViewTries = 30000;
-constexpr double kTurnStep_rad = 5 * kPi / 180;
-constexpr int kTurnRunMin = 4;               // 15 degrees of base joint in which the turning arm sees the board whole
+constexpr int kLookSteps = 10;
+constexpr double kLookTilt_rad = 25 * kPi / 180;
+constexpr double kLookMargin_px = 15;
 
 Solid box(const char* name, const Vector3d& center, const Vector3d& size, double yaw_rad) {
   Solid solid;
@@ -164,7 +165,7 @@ class Layout {
 
   /// Near the arm, its front roughly towards the space above the arm, on a thin post.
   void board() {
-    const Vector3d at = around(0.66, 0.95) + Vector3d(0, 0, random_.uniform(-0.05, 0.45));
+    const Vector3d at = around(0.85, 1.05) + Vector3d(0, 0, random_.uniform(0.20, 0.60));
     const Vector3d toward = Vector3d(0, 0, random_.uniform(0.35, 0.75)) + 0.12 * random_.normal3();
     Pose pose = Pose::Identity();
     const Vector3d z = (at - toward).normalized();
@@ -233,18 +234,21 @@ int diverse_views(const Scene& scene, const ArmModel& arm, const std::vector<Joi
   return static_cast<int>(kept.size());
 }
 
-/// The arm finds the board by turning its base with the wrist tilted: for one tilt it must see it over some angle.
+/// A job begins by looking around: a tenth of a turn at a time, level and with the wrist tilted up and down. One of these
+/// views must see the board whole.
 bool is_found_by_turning(const Scene& scene, const ArmModel& arm, const Renderer& renderer) {
-  const Capsules body = true_body(arm);
-  for (const double tilt : {0.0, -0.35, 0.35}) {
-    int run = 0;
-    for (double turn = 0; turn < 2 * kPi; turn += kTurnStep_rad) {
+  const Body body = body_with_envelope(arm);
+  const Capsules hiding = true_body(arm);
+  for (const double tilt_rad : {0.0, kLookTilt_rad, -kLookTilt_rad}) {
+    for (int step = 0; step < kLookSteps; ++step) {
       JointVector q = scene.start_rad;
-      q[0] += turn;
-      q[3] += tilt;
+      q[0] += 2 * kPi * step / kLookSteps;
+      q[3] += tilt_rad;
       const LinkFrames frames = forward(arm, q);
-      run = renderer.board_in_view(camera_pose(scene, frames), place(body, frames)) ? run + 1 : 0;
-      if (run >= kTurnRunMin) return true;
+      if (renderer.board_in_view(camera_pose(scene, frames), place(hiding, frames), kLookMargin_px) &&
+          stands_in_zone(body, scene.safe_zone, place(body.capsules, frames))) {
+        return true;
+      }
     }
   }
   return false;

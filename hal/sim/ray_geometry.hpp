@@ -12,8 +12,8 @@
 
 namespace firstlook::sim {
 
-/// Calls visit(index) for each voxel of the grid that the ray passes within `length_m`, the last one included (Amanatides and
-/// Woo 1987). `direction` is a unit vector; the origin must lie in the grid, else nothing is visited.
+/// Calls visit(index) for each voxel of the grid that the ray passes within `length_m`, the last one included
+/// (Amanatides and Woo 1987). `direction` is a unit vector; the origin must lie in the grid, else nothing is visited.
 template <typename Visit>
 void walk_ray(const GridGeometry& geometry, const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
               double length_m, Visit visit) {
@@ -25,8 +25,8 @@ void walk_ray(const GridGeometry& geometry, const Eigen::Vector3d& origin_m, con
     step_m[axis] = direction[axis] != 0 ? geometry.resolution_m / std::abs(direction[axis])
                                         : std::numeric_limits<double>::infinity();
     const double wall = (geometry.first[axis] + voxel[axis] + (step[axis] > 0 ? 1 : 0)) * geometry.resolution_m;
-    next_m[axis] = direction[axis] != 0 ? (wall - origin_m[axis]) / direction[axis]
-                                        : std::numeric_limits<double>::infinity();
+    next_m[axis] =
+        direction[axis] != 0 ? (wall - origin_m[axis]) / direction[axis] : std::numeric_limits<double>::infinity();
   }
   while (geometry.contains(voxel)) {
     visit(geometry.index(voxel));
@@ -46,8 +46,8 @@ void walk_ray(const GridGeometry& geometry, const Eigen::Vector3d& origin_m, con
 [[nodiscard]] double segment_to_box_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& low,
                                       const Eigen::Vector3d& high);
 
-/// Calls visit(v) with the coordinates of each voxel, of the grid or beyond it, whose box the capsule overlaps by more than
-/// `tolerance_m`.
+/// Calls visit(v) with the coordinates of each voxel, of the grid or beyond it, whose box the capsule overlaps by more
+/// than `tolerance_m`.
 template <typename Visit>
 void walk_capsule(const GridGeometry& geometry, const Capsule& capsule, double tolerance_m, Visit visit) {
   const double reach_m = capsule.radius_m - tolerance_m;

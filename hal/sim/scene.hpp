@@ -83,7 +83,7 @@ struct Region {
 
 /// Diffuse light: a part from everywhere, a part from one direction, and a gradient across the cell.
 struct Light {
-  Eigen::Vector3d toward = Eigen::Vector3d(0.3, -0.2, 0.93);       ///< unit direction to the lamp
+  Eigen::Vector3d toward = Eigen::Vector3d(0.3, -0.2, 0.93).normalized();  ///< to the lamp
   double ambient = 0.55;
   double directed = 0.45;
   Eigen::Vector3d gradient_per_m = Eigen::Vector3d(0.03, 0.02, 0);  ///< relative change of brightness with place

@@ -11,11 +11,11 @@ namespace firstlook::sim {
 namespace {
 
 constexpr double kBoardSlide_m = 0.03;
-constexpr double kBoardTurn_rad = 0.052;         // 3 degrees
-constexpr double kFixedCameraDistance_m = 0.8;   // in front of the board
-constexpr double kBuried_m = -50;                // below the floor: where no camera looks
+constexpr double kBoardTurn_rad = 0.052;        // 3 degrees
+constexpr double kFixedCameraDistance_m = 0.8;  // in front of the board
+constexpr double kBuried_m = -50;               // below the floor: where no camera looks
 constexpr double kObstacleHalf_m = 0.10;
-constexpr double kObstacleRadius_m = 0.65;       // outside the safe zone, within reach
+constexpr double kObstacleRadius_m = 0.65;  // outside the safe zone, within reach
 constexpr double kObstacleHeight_m = 0.4;
 constexpr double kObstacleTurn_rad = 1.0;
 
@@ -33,7 +33,8 @@ void fix_camera(Scene& scene) {
 }
 
 void shift_board(Scene& scene) {
-  const Pose shift = Eigen::Translation3d(kBoardSlide_m, 0, 0) * Pose(Eigen::AngleAxisd(kBoardTurn_rad, Eigen::Vector3d::UnitZ()));
+  const Pose shift =
+      Eigen::Translation3d(kBoardSlide_m, 0, 0) * Pose(Eigen::AngleAxisd(kBoardTurn_rad, Eigen::Vector3d::UnitZ()));
   move_board(scene, Transform<Base, Board>(scene.board.base_T_board.pose() * shift));
 }
 

@@ -10,8 +10,8 @@
 namespace firstlook::sim {
 namespace {
 
-// Category 0 stops of a UR5 at 180 deg/s take .31, .70 and .22 rad for base, shoulder and elbow (CB3 manual, appendix A):
-// v² / 2 theta is 15.9, 7.0 and 22.4 rad/s². Rounded down; the wrists as the elbow.
+// Category 0 stops of a UR5 at 180 deg/s take .31, .70 and .22 rad for base, shoulder and elbow (CB3 manual, appendix
+// A): v² / 2 theta is 15.9, 7.0 and 22.4 rad/s². Rounded down; the wrists as the elbow.
 constexpr std::array<double, kJointsMax> kBrake_rad_s2 = {12, 6, 16, 16, 16, 16, 16};
 
 // External Control reads with a timeout of this order; when it expires the robot's own script stops.
@@ -121,7 +121,8 @@ Instant SimulatedArm::next_due() const {
 
 Status SimulatedArm::check(const hal::Segment& segment, const JointVector& from_rad) const {
   if (segment.target_rad.size() != model_.joints || !segment.target_rad.all_finite()) {
-    return failure(Fault::kMoveRefused, "segment {}: target is not {} finite joint angles", segment.number, model_.joints);
+    return failure(Fault::kMoveRefused, "segment {}: target is not {} finite joint angles", segment.number,
+                   model_.joints);
   }
   if (!(segment.speed_rad_s > 0) || !(segment.acceleration_rad_s2 > 0) ||
       segment.acceleration_rad_s2 > model_.acceleration_max_rad_s2) {

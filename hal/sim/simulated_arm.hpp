@@ -40,12 +40,13 @@ struct SimulatedArmOptions {
   ArmModel model;
   JointVector start_rad;
   std::uint64_t seed = 1;
-  ControllerScript script;         ///< by time
+  ControllerScript script;  ///< by time
   double encoder_sigma_rad = 2e-5;
   DeviationSigmas deviation;
 };
 
-/// All calls but true_flange from the loop thread. Time only moves forward: a call with an earlier `now` changes nothing.
+/// All calls but true_flange from the loop thread. Time only moves forward: a call with an earlier `now` changes
+/// nothing.
 class SimulatedArm final : public hal::RobotArm {
  public:
   explicit SimulatedArm(const SimulatedArmOptions& options, BodyWatcher* watcher = nullptr);
@@ -87,7 +88,7 @@ class SimulatedArm final : public hal::RobotArm {
   std::size_t newest_ = 0;
   FixedQueue<hal::ArmState, kReportsKept> reports_;
   std::size_t script_next_ = 0;
-  Instant simulated_{};       ///< everything up to here has happened
+  Instant simulated_{};  ///< everything up to here has happened
   Instant next_tick_{};
   JointVector last_true_rad_;
   hal::ArmSafety safety_ = hal::ArmSafety::kNormal;

@@ -36,19 +36,19 @@ struct KeepOut {
 struct CellDescription {
   std::string name;
   std::string arm_model;
-  JointVector start_rad;         ///< where the arm stands before the job
-  CameraIntrinsics color;        ///< of the factory sheet
+  JointVector start_rad;   ///< where the arm stands before the job
+  CameraIntrinsics color;  ///< of the factory sheet
   CameraIntrinsics depth;
   double depth_units_per_m = 1000;
   double depth_range_min_m = 0.5;
   double depth_range_max_m = 5.0;
   double depth_range_trusted_m = 3.0;
-  double depth_noise_at_1m = 0.00285;      ///< sigma at 1 m; grows with z²
+  double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
-  int board_columns = 9;         ///< inner corners
+  int board_columns = 9;                    ///< inner corners
   int board_rows = 6;
   double board_square_m = 0.03;
-  double cart_top_m = -0.02;     ///< z of the cart's own top
+  double cart_top_m = -0.02;  ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
 };
@@ -67,8 +67,8 @@ class SimulatedCell {
   [[nodiscard]] virtual Grader& grader() = 0;
 };
 
-/// Builds a cell from its options. Errors: kCellInvalid for a cell that cannot be used, kUsage for a fault specification
-/// that is not understood, kDataMissing for a file that cannot be opened.
+/// Builds a cell from its options. Errors: kCellInvalid for a cell that cannot be used, kUsage for a fault
+/// specification that is not understood, kDataMissing for a file that cannot be opened.
 [[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options);
 
 }  // namespace firstlook::sim

@@ -27,8 +27,8 @@ bool in_region(const NamedRegion& region, const Eigen::Vector3d& p) {
 
 TruthGrader::TruthGrader(const Truth& truth)
     : truth_(truth),
-      monitor_(truth.arm, true_capsules(truth.arm, truth.link, truth.link_T_camera),
-               base_allowance(truth.arm), truth.space.zone, *truth.world),
+      monitor_(truth.arm, true_capsules(truth.arm, truth.link, truth.link_T_camera), base_allowance(truth.arm),
+               truth.space.zone, *truth.world),
       workers_(truth.workers) {}
 
 void TruthGrader::watch(const KnownFreeView* view) {

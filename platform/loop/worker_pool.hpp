@@ -8,8 +8,8 @@
 #include <mutex>
 #include <string>
 
-#include "platform/linux/thread.hpp"
 #include "platform/core/function_ref.hpp"
+#include "platform/linux/thread.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {

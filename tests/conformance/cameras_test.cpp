@@ -39,7 +39,9 @@ using MockDepth = Mock<mock::MockDepthCamera, std::uint16_t>;
 template <typename Pixel>
 struct Image {
   explicit Image(const CameraIntrinsics& i)
-      : width(i.width), height(i.height), pixels(static_cast<std::size_t>(i.width) * static_cast<std::size_t>(i.height)) {}
+      : width(i.width),
+        height(i.height),
+        pixels(static_cast<std::size_t>(i.width) * static_cast<std::size_t>(i.height)) {}
   ImageView<Pixel> view() { return {pixels.data(), width, height}; }
   int width, height;
   std::vector<Pixel> pixels;

@@ -67,7 +67,8 @@ TEMPLATE_TEST_CASE("keys come once, in order, and not before they are pressed", 
   CHECK(d.device.next_due() > at(1e6));
 }
 
-TEMPLATE_TEST_CASE("what is shown arrives", "[hal][operator]", SimulatedPendant, SimulatedPanel, MockPendant, MockPanel) {
+TEMPLATE_TEST_CASE("what is shown arrives", "[hal][operator]", SimulatedPendant, SimulatedPanel, MockPendant,
+                   MockPanel) {
   TestType d;
   d.tell();
   CHECK(d.told());

@@ -105,8 +105,8 @@ TEMPLATE_TEST_CASE("an arm executes a segment to its end and reports its number"
   CHECK(arm.counters().segments == 2);
 }
 
-TEMPLATE_TEST_CASE("an arm refuses without consent, while it moves, after a protective stop, and nonsense", "[hal][arm]",
-                   Simulated, Mock) {
+TEMPLATE_TEST_CASE("an arm refuses without consent, while it moves, after a protective stop, and nonsense",
+                   "[hal][arm]", Simulated, Mock) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   CHECK_FALSE(latest(arm, at(0.05)).program_running);
@@ -127,7 +127,8 @@ TEMPLATE_TEST_CASE("an arm refuses without consent, while it moves, after a prot
   CHECK(arm.counters().segments == 1);
 }
 
-TEMPLATE_TEST_CASE("stop ends the motion short of the target and withdraws the segment", "[hal][arm]", Simulated, Mock) {
+TEMPLATE_TEST_CASE("stop ends the motion short of the target and withdraws the segment", "[hal][arm]", Simulated,
+                   Mock) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   static_cast<void>(latest(arm, at(1)));

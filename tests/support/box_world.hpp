@@ -62,7 +62,8 @@ class BoxWorld final : public sim::TrueWorld {
     for (std::size_t i = 0; i < out.size(); ++i) {
       const Eigen::Vector3d center = g.center_m(g.voxel_at(i));
       out[i] = std::ranges::any_of(boxes, [&](const SolidBox& box) {
-        return ((center + half).array() > box.low_m.array()).all() && ((center - half).array() < box.high_m.array()).all();
+        return ((center + half).array() > box.low_m.array()).all() &&
+               ((center - half).array() < box.high_m.array()).all();
       });
     }
   }

@@ -10,10 +10,11 @@ namespace firstlook::mock {
 
 class MockColorCamera final : public MockStream<hal::ColorCamera> {
  public:
-  explicit MockColorCamera(const CameraIntrinsics& intrinsics = {64, 48, 60, 60, 31.5, 23.5}, Duration period = milliseconds(66))
+  explicit MockColorCamera(const CameraIntrinsics& intrinsics = {64, 48, 60, 60, 31.5, 23.5},
+                           Duration period = milliseconds(66))
       : MockStream(intrinsics, period) {}
 
-  std::uint8_t gray = 128;                                              ///< of every pixel
+  std::uint8_t gray = 128;                                                          ///< of every pixel
   std::function<std::optional<hal::CornerObservation>(const hal::Frame&)> corners;  ///< none: pixels only
 
   [[nodiscard]] Status read(const hal::Frame& frame, MutableGrayImage image) override {

@@ -10,7 +10,8 @@ namespace firstlook::mock {
 
 class MockDepthCamera final : public MockStream<hal::DepthCamera> {
  public:
-  explicit MockDepthCamera(const CameraIntrinsics& intrinsics = {64, 48, 58, 58, 31.5, 23.5}, Duration period = milliseconds(33))
+  explicit MockDepthCamera(const CameraIntrinsics& intrinsics = {64, 48, 58, 58, 31.5, 23.5},
+                           Duration period = milliseconds(33))
       : MockStream(intrinsics, period) {}
 
   double wall_m = 1.5;

@@ -1,4 +1,5 @@
-/// A scripted arm for unit tests: an ideal controller that reports at 125 Hz, moves linearly, and does what the test says.
+/// A scripted arm for unit tests: an ideal controller that reports at 125 Hz, moves linearly, and does what the test
+/// says.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +15,8 @@ class MockRobotArm final : public hal::RobotArm {
  public:
   static constexpr Duration kPeriod = milliseconds(8);
 
-  explicit MockRobotArm(const JointVector& start_rad = JointVector::zero(6)) : at_rad_(start_rad), from_rad_(start_rad) {}
+  explicit MockRobotArm(const JointVector& start_rad = JointVector::zero(6))
+      : at_rad_(start_rad), from_rad_(start_rad) {}
 
   // The script.
   void at(Instant stamp, std::function<void(MockRobotArm&)> change) { script_.push_back({stamp, std::move(change)}); }

@@ -54,7 +54,8 @@ TEST_CASE("hand-eye rotations of exactly 0 and 180 degrees", "[calibration]") {
   Random random(2);
   for (const Eigen::Vector3d& vector :
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(std::numbers::pi, 0, 0), Eigen::Vector3d(0, std::numbers::pi, 0),
-        Eigen::Vector3d(0, 0, std::numbers::pi), Eigen::Vector3d(1, 1, 0).normalized() * std::numbers::pi}) {
+        Eigen::Vector3d(0, 0, std::numbers::pi),
+        Eigen::Vector3d(Eigen::Vector3d(1, 1, 0).normalized() * std::numbers::pi)}) {
     Pose truth = Pose::Identity();
     truth.linear() = rotation_exp(vector);
     truth.translation() = Eigen::Vector3d(.1, .2, .3);
@@ -150,6 +151,8 @@ TEST_CASE("residual of AX = XB", "[calibration]") {
   const Transform<Flange, Camera> truth(setup.flange_T_camera);
   CHECK(ax_xb_residual_all_pairs(pairs, truth).rotation_rms_deg < 1e-6);
   CHECK(ax_xb_residual_all_pairs(pairs, truth).translation_rms_mm < 1e-6);
+  CHECK(board_in_base_residual(pairs, truth).rotation_rms_deg < 1e-6);
+  CHECK(board_in_base_residual(pairs, truth).translation_rms_mm < 1e-6);
   // A wrong translation t shows as (R_A - I) t between two views.
   Vector6d shift = Vector6d::Zero();
   shift.x() = 0.01;

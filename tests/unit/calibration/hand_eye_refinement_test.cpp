@@ -18,8 +18,8 @@ namespace {
 Transform<Flange, Camera> closed_form(const Setup& setup, const std::vector<CalibrationView>& views) {
   std::vector<PosePair> pairs;
   for (const CalibrationView& view : views) {
-    pairs.push_back(
-        {view.base_T_flange, estimate_board_pose(setup.camera, setup.board, view.corners_px)->camera_T_board});
+    pairs.push_back({view.base_T_flange,
+                     estimate_board_pose_robust(setup.camera, setup.board, view.corners_px)->pose.camera_T_board});
   }
   return *robust_closed_form(pairs, Solver::kParkMartin, 6);
 }
@@ -59,8 +59,6 @@ Trials run_trials(const Setup& setup, int views_each, std::uint64_t seeds, const
     t.log_arm_translation += std::log(fit->arm_sigma.translation_m / setup.arm_sigma.translation_m) / n;
     t.log_arm_rotation += std::log(fit->arm_sigma.rotation_rad / setup.arm_sigma.rotation_rad) / n;
   }
-  INFO("RMS " << std::sqrt(t.translation2) * 1e3 << " mm " << std::sqrt(t.rotation2) * 1e3 << " mrad, over the bound "
-              << t.translation_ratio() << " / " << t.rotation_ratio() << ", normalised " << t.normalized);
   UNSCOPED_INFO("RMS " << std::sqrt(t.translation2) * 1e3 << " mm " << std::sqrt(t.rotation2) * 1e3
                        << " mrad, over the bound " << t.translation_ratio() << " / " << t.rotation_ratio()
                        << ", normalised " << t.normalized << ", arm " << t.log_arm_translation << " "

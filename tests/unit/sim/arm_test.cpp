@@ -106,9 +106,8 @@ TEST_CASE("nothing moves without the operator's program", "[sim][arm]") {
     CHECK(arm.true_joints(at(2.5)) == start);
   }
   SECTION("a pause withdraws the segment, and resuming does not bring it back") {
-    SimulatedArm arm(options_with({{Instant{}, ControllerAction::kPlay},
-                                   {at(1.5), ControllerAction::kPause},
-                                   {at(3), ControllerAction::kPlay}}));
+    SimulatedArm arm(options_with(
+        {{Instant{}, ControllerAction::kPlay}, {at(1.5), ControllerAction::kPause}, {at(3), ControllerAction::kPlay}}));
     arm.advance(at(1));
     REQUIRE(arm.move(to(moved(start, 0, 1)), at(1)).has_value());
     const hal::ArmState paused = latest(arm, at(2.9));

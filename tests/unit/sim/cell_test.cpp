@@ -96,7 +96,8 @@ TEST_CASE("a frame shows the arm at its exposure, however late it is read", "[si
   CHECK(pixels == expected);
 }
 
-TEST_CASE("a frozen camera keeps its picture, a stalled one its frames, a wrong clock its stamps wrong", "[sim][cell]") {
+TEST_CASE("a frozen camera keeps its picture, a stalled one its frames, a wrong clock its stamps wrong",
+          "[sim][cell]") {
   const auto frozen = cell_with("depth.freeze_at=2");
   static_cast<void>(depth_at(*frozen, at(1.99)));
   turn_base(*frozen, 0.8, at(2));
@@ -127,7 +128,7 @@ TEST_CASE("an obstacle that appears in the way stops the arm by contact", "[sim]
       while (cell->arm().poll(from)) {
       }
       hal::Segment segment{number, reach, 0.5, 1.0};
-      segment.target_rad[0] = std::remainder(base_rad, 6.283185307179586);
+      segment.target_rad[0] = base_rad;
       REQUIRE(cell->arm().move(segment, from).has_value());
       while (const auto state = cell->arm().poll(until)) last = *state;
     };
@@ -147,7 +148,8 @@ TEST_CASE("an obstacle that appears in the way stops the arm by contact", "[sim]
   CHECK(cell->grader().contacts() == 1);
 }
 
-TEST_CASE("a camera beside the arm sees the same, wherever the arm is; without a board nothing is found", "[sim][cell]") {
+TEST_CASE("a camera beside the arm sees the same, wherever the arm is; without a board nothing is found",
+          "[sim][cell]") {
   const auto fixed = cell_with("camera.fixed=1");
   const auto before = fixed->color().poll(at(1));
   REQUIRE(before.has_value());

@@ -19,6 +19,8 @@ class TestView final : public KnownFreeView {
   std::vector<std::uint8_t> free = std::vector<std::uint8_t>(grid.count(), 1);
   [[nodiscard]] const GridGeometry& geometry() const override { return grid; }
   [[nodiscard]] bool free_for_motion(std::size_t voxel) const override { return free[voxel] != 0; }
+  bool intact = false;
+  [[nodiscard]] bool zone_intact() const override { return intact; }
 };
 
 ContactMonitor monitor_in(const TrueWorld& world) {
@@ -103,6 +105,29 @@ TEST_CASE("each unknown voxel on the way is counted when the body enters it", "[
   CHECK(monitor.unknown_entries() > 10);
 }
 
+TEST_CASE("inside the intact safe zone nothing counts, outside of it the same voxels do", "[sim][contacts]") {
+  const BoxWorld world;
+  TestView view;
+  view.free.assign(view.free.size(), 0);
+  const auto entries = [&](bool intact, const JointVector& from, const JointVector& to) {
+    view.intact = intact;
+    ContactMonitor monitor = monitor_in(world);
+    monitor.watch(&view);
+    static_cast<void>(monitor.body_moved(Instant{}, from, to));
+    return monitor.unknown_entries();
+  };
+  CHECK(entries(true, turned(-3), turned(3)) == 0);
+  CHECK(entries(false, turned(-3), turned(3)) > 100);
+  CHECK(entries(true, turned(0), stretched(0)) > 10);
+  // A capsule that grows out of the zone within one voxel: the voxel counts from then on.
+  view.grid = GridGeometry::covering({-2, -2, -2}, {2, 2, 2}, 4);
+  view.free.assign(view.grid.count(), 0);
+  CHECK(entries(true, turned(0), turned(1)) == 0);
+  const std::uint64_t grown = entries(true, turned(0), stretched(0));
+  CHECK(grown >= 1);
+  CHECK(grown <= 8);  // all the voxels there are
+}
+
 TEST_CASE("a voxel counts when the capsule overlaps its box, not when it only touches it", "[sim][contacts]") {
   const GridGeometry grid = GridGeometry::covering({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 0.1);
   const auto count = [&](const Capsule& capsule) {
@@ -111,10 +136,10 @@ TEST_CASE("a voxel counts when the capsule overlaps its box, not when it only to
     return voxels;
   };
   const Eigen::Vector3d center(0.05, 0.05, 0.05);
-  CHECK(count({center, center, 0.05, 1}) == 1);       // fits, touching all six faces
-  CHECK(count({center, center, 0.051, 1}) == 7);      // the six neighbours by faces
-  CHECK(count({center, center, 0.0708, 1}) == 19);    // and by edges: 0.0707 away
-  CHECK(count({center, center, 0.0867, 1}) == 27);    // and by corners: 0.0866 away
+  CHECK(count({center, center, 0.05, 1}) == 1);     // fits, touching all six faces
+  CHECK(count({center, center, 0.051, 1}) == 7);    // the six neighbours by faces
+  CHECK(count({center, center, 0.0708, 1}) == 19);  // and by edges: 0.0707 away
+  CHECK(count({center, center, 0.0867, 1}) == 27);  // and by corners: 0.0866 away
   CHECK(count({center, center + Eigen::Vector3d(0.1, 0, 0), 0.04, 1}) == 2);
 }
 

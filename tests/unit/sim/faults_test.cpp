@@ -8,7 +8,8 @@ using namespace firstlook;
 using namespace firstlook::sim;
 
 TEST_CASE("a fault specification is read", "[sim][faults]") {
-  const auto faults = parse_faults("depth.drop=0.05,operator.pause_at=20:5,board.absent=1,link.lost_at=40,depth.clock=-0.1");
+  const auto faults =
+      parse_faults("depth.drop=0.05,operator.pause_at=20:5,board.absent=1,link.lost_at=40,depth.clock=-0.1");
   REQUIRE(faults.has_value());
   CHECK(faults->depth_drop == 0.05);
   CHECK(faults->pause_s == 20);
@@ -35,8 +36,9 @@ TEST_CASE("an unknown fault names the nearest known one", "[sim][faults]") {
 }
 
 TEST_CASE("values out of range are refused", "[sim][faults]") {
-  for (const char* bad : {"depth.drop=1.5", "depth.drop", "depth.drop=", "link.lost_at=-1", "link.lost_at=soon",
-                          "board.absent=yes", "operator.pause_at=5:0", "depth.clock=nan", "depth.drop=0.1x", ",", "=1"}) {
+  for (const char* bad :
+       {"depth.drop=1.5", "depth.drop", "depth.drop=", "link.lost_at=-1", "link.lost_at=soon", "board.absent=yes",
+        "operator.pause_at=5:0", "depth.clock=nan", "depth.drop=0.1x", ",", "=1"}) {
     INFO(bad);
     CHECK_FALSE(parse_faults(bad).has_value());
   }

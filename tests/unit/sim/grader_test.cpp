@@ -90,7 +90,8 @@ TEST_CASE("a covariance that is not positive has no normalised error", "[sim][gr
   CHECK_FALSE(grader.grade(claims).hand_eye_mahalanobis2.has_value());
 }
 
-TEST_CASE("coverage counts observable voxels that the map knows, false free those that lie in matter", "[sim][grader]") {
+TEST_CASE("coverage counts observable voxels that the map knows, false free those that lie in matter",
+          "[sim][grader]") {
   BoxWorld world;
   world.add_room({-1.2, -1.2, -0.2}, {1.2, 1.2, 1.4});
   Truth truth = truth_in(world);

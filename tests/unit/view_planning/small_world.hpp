@@ -144,8 +144,8 @@ struct SmallWorld {
     return all == 0 ? 1.0 : static_cast<double>(known) / static_cast<double>(all);
   }
 
-  /// Dense check that shares no code with the certificate: no voxel centre inside a capsule may be anything but free for
-  /// motion, at 100 places of every segment; links 0 and 1 are exempt inside the allowance.
+  /// Dense check that shares no code with the certificate: no voxel centre inside a capsule may be anything but free
+  /// for motion, at 100 places of every segment; links 0 and 1 are exempt inside the allowance.
   int entries_into_unknown(const Path& path) const {
     int entries = 0;
     for (std::size_t i = 1; i < path.waypoints.size(); ++i) {

@@ -24,7 +24,7 @@ TEST_CASE("the sweep looks all around on certified paths and then ends", "[sweep
     const auto step = next_sweep_step(progress, world.context(), gain, worker, planner, world.q);
     REQUIRE(step);
     if (step->done) break;
-    REQUIRE(step->gain.unknown >= 200);
+    REQUIRE(step->gain.unknown >= 800);  // 0.1 m^3
     REQUIRE(step->path.waypoints.front() == world.q);
     REQUIRE(step->path.waypoints.back() == step->target);
     REQUIRE(world.entries_into_unknown(step->path) == 0);
@@ -33,12 +33,13 @@ TEST_CASE("the sweep looks all around on certified paths and then ends", "[sweep
   INFO(steps << " steps, coverage " << world.coverage());
   REQUIRE(steps >= 6);
   REQUIRE(steps < static_cast<int>(progress.steps.size()));  // the adaptive part: some were not worth it
-  REQUIRE(world.coverage() > 0.6);
+  REQUIRE(world.coverage() > 0.5);
 }
 
 TEST_CASE("an arm that does not stand free is not swept", "[sweep]") {
   SmallWorld world(Truth::room());
   world.space.zone_intact = false;
+  world.space.field = nullptr;
   GainModel gain(world.map.geometry(), world.sensor);
   GainWorker worker = gain.worker();
   Planner planner;

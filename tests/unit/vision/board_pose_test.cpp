@@ -69,6 +69,22 @@ TEST_CASE("pose errors agree with the covariance", "[vision]") {
   CHECK(normalized < 7.5);
 }
 
+TEST_CASE("single wrong corners do not move the robust pose", "[vision]") {
+  Random random(14);
+  for (int i = 0; i < 50; ++i) {
+    const Pose truth = random_view(random);
+    auto corners = observe(truth, 0.1, random);
+    const auto clean = estimate_board_pose_robust(kCamera, kBoard, corners);
+    corners[static_cast<std::size_t>(random.below(54))] += Eigen::Vector2d(9, -7);
+    corners[53] += Eigen::Vector2d(0, 5);
+    const auto robust = estimate_board_pose_robust(kCamera, kBoard, corners);
+    REQUIRE(clean);
+    REQUIRE(robust);
+    CHECK((robust->pose.camera_T_board.translation() - clean->pose.camera_T_board.translation()).norm() < 2e-3);
+    CHECK(robust->weights[53] == 0);
+  }
+}
+
 TEST_CASE("corners that are no board are refused", "[vision]") {
   Random random(13);
   auto corners = observe(random_view(random), 0.1, random);

@@ -181,6 +181,7 @@ TEST_CASE("malloc in a job gives null beyond the cap, and an absurd size, too") 
   void* absurd = nullptr;
   void* product = nullptr;
   int aligned = 0;
+  std::int64_t left = -1;
   {
     const memory::JobHeapScope job(10'000);
     // volatile: the compiler would warn of, or remove, what it can see through
@@ -193,6 +194,7 @@ TEST_CASE("malloc in a job gives null beyond the cap, and an absurd size, too") 
     aligned = posix_memalign(&block, 64, 20'000);
     kept = std::realloc(within, 5000);
     std::free(kept);
+    left = job.outstanding_bytes();
   }
   CHECK(within != nullptr);
   CHECK(grown == nullptr);
@@ -200,6 +202,7 @@ TEST_CASE("malloc in a job gives null beyond the cap, and an absurd size, too") 
   CHECK(product == nullptr);
   CHECK(aligned == ENOMEM);
   CHECK(kept != nullptr);
+  CHECK(left == 0);
 }
 
 TEST_CASE("for every N the Nth allocation of a job fails, once") {
