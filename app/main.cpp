@@ -48,7 +48,7 @@ class KnownFree final : public sim::KnownFreeView {
   explicit KnownFree(const PublishedSpace& space) : space_(space) {}
   [[nodiscard]] const GridGeometry& geometry() const override { return space_.geometry(); }
   [[nodiscard]] bool free_for_motion(std::size_t voxel) const override { return space_.free_for_motion(voxel); }
-  [[nodiscard]] bool zone_intact() const override { return space_.space().zone_intact; }
+  [[nodiscard]] bool zone_revoked(std::size_t voxel) const override { return space_.zone_revoked(voxel); }
 
  private:
   const PublishedSpace& space_;

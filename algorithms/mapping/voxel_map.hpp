@@ -96,6 +96,7 @@ class VoxelMap {
   /// and forgets its revocations. Log-odds stay untouched.
   void set_safe_zone(const SafeZone& zone);
   [[nodiscard]] bool in_intact_safe_zone(std::size_t index) const;
+  [[nodiscard]] bool zone_revoked(std::size_t index) const;
 
   /// Every voxel that the obstacle touches is never free for motion: keep-out regions and the cart's own box.
   void block(const AxisBox& box);

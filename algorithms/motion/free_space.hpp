@@ -40,7 +40,8 @@ inline constexpr std::size_t kKeepOutsMax = 16;
 struct FreeSpace {
   const DistanceField* field = nullptr;  ///< null before anything is mapped
   SafeZone zone;
-  bool zone_intact = true;  ///< false once a voxel of it was revoked; the field alone counts then
+  bool zone_intact = true;  ///< false: the zone does not count, the field alone does
+  const DistanceField* revoked = nullptr;  ///< distance to the voxels of the zone that a hit took away; null: none
   FixedVector<KeepOutBox, kKeepOutsMax> keep_out_boxes;
   FixedVector<KeepOutPlane, kKeepOutsMax> keep_out_planes;
 
@@ -50,7 +51,9 @@ struct FreeSpace {
   }
   /// Distance from p to the outside of the safe zone, beyond what is required; -infinity when the zone does not count.
   [[nodiscard]] double zone_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {
-    return zone_intact ? zone.depth_m(p) - need.surface_m : -std::numeric_limits<double>::infinity();
+    if (!zone_intact) return -std::numeric_limits<double>::infinity();
+    const double surface = zone.depth_m(p) - need.surface_m;
+    return revoked != nullptr ? std::min(surface, revoked->distance_m(p) - need.voxels_m) : surface;
   }
   /// Distance from p to the nearest keep-out, beyond what is required; +infinity without any.
   [[nodiscard]] double keep_out_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {

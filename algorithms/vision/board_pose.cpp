@@ -180,7 +180,7 @@ Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const Boar
   if (other && (!best || other->normal.cost < best->normal.cost)) best = other;
   if (!best) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
 
-  const BoardPose result = to_board_pose(*best, 2.0 * board.corners());
+  BoardPose result = to_board_pose(*best, 2.0 * board.corners());
   if (!(result.residual_rms_px <= residual_max_px)) {
     return failure(Fault::kBoardNotFound, "corners off by {:.2f} px RMS from any pose of the board",
                    result.residual_rms_px);

@@ -25,7 +25,8 @@ struct BoardSpec {
   [[nodiscard]] int corners() const { return inner_columns * inner_rows; }
   /// Corner number `i` = row * inner_columns + column, in the board frame.
   [[nodiscard]] Eigen::Vector3d corner(int i) const {
-    return {square_size_m * (i % inner_columns), square_size_m * (i / inner_columns), 0.0};
+    const int row = i / inner_columns;
+    return {square_size_m * (i % inner_columns), square_size_m * row, 0.0};
   }
   /// The middle of the corners, in the board frame.
   [[nodiscard]] Eigen::Vector3d center() const {

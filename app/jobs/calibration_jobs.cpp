@@ -61,10 +61,13 @@ std::optional<ViewDesignModel> Workbench::rough_model() const {
 CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
   CalibrationViewResult result;
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
-  if (bootstrap_.empty()) {
-    auto views = bootstrap_views(arm_, envelope_body_, space, blind_terms_.clearance(), here.at_rad);
-    if (!views) return result;
-    bootstrap_.push_back(here.at_rad);  // where the board was seen is a view, too
+  if (bootstrap_.empty()) bootstrap_.push_back(here.at_rad);  // where the board was seen is a view, too
+  // Around where the arm is now, then around each view that saw the board, until enough views did.
+  while (bootstrap_next_ == bootstrap_.size() && bootstrap_centers_ <= observations_.size() && !bootstrap_.full()) {
+    const JointVector center = bootstrap_centers_ == 0 ? here.at_rad : observations_[bootstrap_centers_ - 1].joints_rad;
+    ++bootstrap_centers_;
+    const auto views = bootstrap_views(arm_, envelope_body_, space, blind_terms_.clearance(), center);
+    if (!views) continue;
     for (const JointVector& q : *views) {
       if (!bootstrap_.full()) bootstrap_.push_back(q);
     }
@@ -75,7 +78,7 @@ CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
                                     {.seed = here.step + 1, .limits = limits_});
     if (!path) continue;
     result.found = true;
-    result.path = route_of(*path, envelope_body_);
+    result.path = route_of(*path, envelope_body_, limits_);
     return result;
   }
   return result;
@@ -106,7 +109,7 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   const auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
   if (choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen) {
     result.found = true;
-    result.path = route_of(choice->path, envelope_body_);
+    result.path = route_of(choice->path, envelope_body_, limits_);
   } else if (observations_.size() < static_cast<std::size_t>(config_.calibration.views_min)) {
     return next_bootstrap_view(here);  // few places see the board: take what there is
   }

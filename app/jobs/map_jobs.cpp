@@ -25,16 +25,15 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
     render_self_depth(std::span<const Capsule>(body.data(), body.size()), kSelfPadding_m, base_T_depth, camera,
                       self_depth_.items());
     const DepthImage depth{{pixels.data, pixels.width, pixels.height}, depth_.units_per_m()};
-    if (const auto inserted = inserter_.insert(map_, depth, base_T_depth, self_depth_.items(), stamp_s)) {
+    if (inserter_.insert(map_, depth, base_T_depth, self_depth_.items(), stamp_s)) {
       result.used = true;
       ++frames_integrated_;
-      if (inserted->change.zone_revoked > 0) zone_intact_ = false;
     }
   }
   if (!result.used) ++frames_dropped_;
   last_stamp_s_ = std::max(last_stamp_s_, arguments.now_s);
   rebuild_free_space(last_stamp_s_);
-  result.path_free = route_is_certified(arguments.arm_rad, arguments.ahead, MotionPhase::kMapping);
+  result.path_free = route_is_certified(arguments.arm_rad, arguments.ahead);
 
   const VoxelCounts counts = zone_counts();
   result.unknown = counts.unknown;
@@ -43,7 +42,7 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   result.gained = unknown_before_ > counts.unknown ? unknown_before_ - counts.unknown : 0;
   unknown_before_ = counts.unknown;
   if (arguments.at_view) {
-    chooser_.remember_look(context(), arguments.frame.at_rad);
+    chooser_.remember_look(context(clearance_in_force_), arguments.frame.at_rad);
     note_view(arguments, result.gained);
   }
   return result;
@@ -72,7 +71,7 @@ SummarizeResult Workbench::summarize() {
       find_remaining(map_, zone_, static_cast<std::size_t>(config_.explore.cluster_voxels_min));
   ReasonOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
-  const ViewContext view_context = context();
+  const ViewContext view_context = context(clearance_in_force_);
   chooser_.gain().prepare(view_context);
   for (const RemainingEntry& entry : explain_remaining(view_context, chooser_.gain(), clusters, options)) {
     remaining_.push_back({entry.voxels, std::string(to_string(entry.reason)), entry.center_m});

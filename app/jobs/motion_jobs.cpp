@@ -3,22 +3,20 @@
 
 namespace firstlook {
 
-Route Workbench::route_of(const Path& path, const Body& body) const {
+Route Workbench::route_of(const Path& path, const Body& body, const SpeedLimits& limits) const {
   Route route;
   for (std::size_t i = 1; i < path.waypoints.size(); ++i) {
-    const SegmentTiming t = time_segment(arm_, body.capsules, path.waypoints[i - 1], path.waypoints[i], limits_);
+    const SegmentTiming t = time_segment(arm_, body.capsules, path.waypoints[i - 1], path.waypoints[i], limits);
     if (t.duration_s > 0) route.push_back({path.waypoints[i], t.leading_speed_rad_s, t.leading_acceleration_rad_s2});
   }
   return route;
 }
 
-bool Workbench::route_is_certified(const JointVector& from, const Route& route, MotionPhase phase,
-                                   double* margin_m) const {
-  const FreeSpace space = space_of(phase);
-  const Clearance clearance = clearance_of(phase);
+bool Workbench::route_is_certified(const JointVector& from, const Route& route, double* margin_m) const {
   JointVector at = from;
   for (const Leg& leg : route) {
-    const Certificate certificate = certify(arm_, body_of(phase), space, clearance, at, leg.target_rad);
+    const Certificate certificate =
+        certify(arm_, camera_body_, mapping_space_, clearance_in_force_, at, leg.target_rad);
     if (!certificate.certified()) return false;
     if (margin_m != nullptr) *margin_m = std::min(*margin_m, certificate.margin_m);
     at = leg.target_rad;
@@ -28,20 +26,34 @@ bool Workbench::route_is_certified(const JointVector& from, const Route& route, 
 
 PlanResult Workbench::plan(const PlanArguments& arguments) {
   PlanResult result;
-  const Body& body = body_of(arguments.phase);
-  if (arguments.phase == MotionPhase::kMapping) rebuild_free_space(arguments.now_s);
+  const bool mapping = arguments.phase == MotionPhase::kMapping;
   PlannerOptions options;
   options.seed = mix64(static_cast<std::uint64_t>(config_.seed)) + arguments.step;
   options.limits = limits_;
-  const auto path = planner_.plan(arm_, body, space_of(arguments.phase), clearance_of(arguments.phase),
-                                  arguments.from_rad, arguments.to_rad, options);
-  if (!path) {
-    result.fault = path.error().fault;
+  const auto plan_at = [&](const FreeSpace& space, const Pace& pace) {
+    const Body& body = body_of(arguments.phase);
+    options.limits = pace.limits;
+    const auto path =
+        planner_.plan(arm_, body, space, pace.plan, arguments.from_rad, arguments.to_rad, options);
+    if (!path) {
+      result.fault = path.error().fault;
+      return;
+    }
+    result.found = true;
+    result.path = route_of(*path, body, pace.limits);
+    result.margin_m = path->margin_m;
+    clearance_in_force_ = pace.in_force;
+  };
+  if (!mapping) {
+    const Clearance blind = blind_terms_.clearance();
+    plan_at(space_of(MotionPhase::kBeforeCalibration), {blind, blind, limits_});
     return result;
   }
-  result.found = true;
-  result.path = route_of(*path, body);
-  result.margin_m = path->margin_m;
+  rebuild_free_space(arguments.now_s);
+  for (const Pace& pace : mapping_paces()) {
+    plan_at(mapping_space_, pace);
+    if (result.found) break;
+  }
   return result;
 }
 
@@ -49,29 +61,29 @@ PlanResult Workbench::certify_path(const PlanArguments& arguments) {
   PlanResult result;
   rebuild_free_space(arguments.now_s);
   result.margin_m = 1;
-  result.found = route_is_certified(arguments.from_rad, arguments.path, arguments.phase, &result.margin_m);
+  result.found = route_is_certified(arguments.from_rad, arguments.path, &result.margin_m);
   result.path = arguments.path;
   return result;
 }
 
-void Workbench::take_choice(NextViewResult& result, const Path& path, double gain) {
+void Workbench::take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace) {
   result.found = true;
-  result.path = route_of(path, camera_body_);
+  result.path = route_of(path, camera_body_, pace.limits);
   result.gain_expected = gain;
   expected_gain_ = gain;
+  clearance_in_force_ = pace.in_force;
 }
 
-NextViewResult Workbench::next_sweep_view(const FromHere& here) {
+NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
   NextViewResult result;
-  rebuild_free_space(here.now_s);
-  const CameraIntrinsics& depth = depth_.intrinsics();
   SweepOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed) + here.step;
-  options.limits = limits_;
+  options.limits = pace.limits;
   if (!sweep_) {
+    const CameraIntrinsics& depth = depth_.intrinsics();
     sweep_ = plan_sweep(arm_, facts_.start_rad, 2 * std::atan(depth.width / (2 * depth.fx)), options);
   }
-  const ViewContext view_context = context();
+  const ViewContext view_context = context(pace.plan);
   chooser_.gain().prepare(view_context);
   const auto step = next_sweep_step(*sweep_, view_context, chooser_.gain(), chooser_.first_worker(), planner_,
                                     here.at_rad, options);
@@ -79,24 +91,32 @@ NextViewResult Workbench::next_sweep_view(const FromHere& here) {
     result.blocked = step.error().fault == Fault::kStartBlocked;
     result.fault = step.error().fault;
   } else if (!step->done) {
-    take_choice(result, step->path, step->gain.unknown);
-  } else {
-    sweeping_ = false;
+    take_choice(result, step->path, step->gain.unknown, pace);
   }
   return result;
 }
 
-NextViewResult Workbench::next_view(const FromHere& here) {
-  NextViewResult result;
-  sweeping_ = false;
+NextViewResult Workbench::next_sweep_view(const FromHere& here) {
   rebuild_free_space(here.now_s);
+  NextViewResult result;
+  for (const Pace& pace : mapping_paces()) {
+    result = sweep_at(pace, here);
+    if (!result.blocked) break;
+  }
+  sweeping_ = result.found || result.blocked;
+  return result;
+}
+
+NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
+  NextViewResult result;
   ExploreOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.step = here.step;
   options.gain_min = static_cast<std::uint32_t>(config_.explore.cluster_voxels_min);
   options.certificate_samples = config_.explore.certificate_samples;
-  options.timing = timing();
-  const ViewContext view_context = context();
+  options.timing.limits = pace.limits;
+  options.timing.settle_s = config_.calibration.settle_time_s;
+  const ViewContext view_context = context(pace.plan);
   const auto choice = chooser_.choose(view_context, here.at_rad, options, [this](int n, IndexedBody body) {
     workers_.parallel_for(n, [&body](int index, int worker) { body(index, worker); });
   });
@@ -106,7 +126,22 @@ NextViewResult Workbench::next_view(const FromHere& here) {
     return result;
   }
   result.candidates = static_cast<std::uint32_t>(choice->free);
-  if (choice->outcome == ViewChoice::Outcome::kChosen) take_choice(result, choice->path, choice->gain.unknown);
+  result.blocked = choice->outcome == ViewChoice::Outcome::kNothingReachable;
+  if (choice->outcome == ViewChoice::Outcome::kChosen) take_choice(result, choice->path, choice->gain.unknown, pace);
+  return result;
+}
+
+NextViewResult Workbench::next_view(const FromHere& here) {
+  rebuild_free_space(here.now_s);
+  sweeping_ = false;
+  NextViewResult result;
+  const auto paces = mapping_paces();
+  for (std::size_t i = 0; i < paces.size(); ++i) {
+    result = explore_at(paces[i], here);
+    // Nothing more to see with room to spare may still be seen with the clearance that is required; slower only when
+    // the arm could not move otherwise.
+    if (result.found || (i >= 1 && !result.blocked)) break;
+  }
   return result;
 }
 

@@ -17,22 +17,28 @@ namespace firstlook {
 
 class PublishedSpace {
  public:
+  // What the published bytes say of a voxel.
+  static constexpr std::uint8_t kNotFreeVoxel = 0, kFreeVoxel = 1, kRevokedVoxel = 2;
+
   PublishedSpace(const GridGeometry& geometry, double distance_max_m)
       : next_field_(geometry, distance_max_m),
         field_(geometry, distance_max_m),
+        next_revoked_(geometry, distance_max_m),
+        revoked_(geometry, distance_max_m),
         next_free_(geometry.count(), 0),
         free_(geometry.count(), 0) {}
 
   /// From a job: what will be seen from the next take() on. `field` may be null: only the zone counts.
   void publish(const FreeSpace& space, const Body& body, const Clearance& guardian_clearance,
-               std::span<const std::uint8_t> free_mask) {
+               std::span<const std::uint8_t> voxels) {
     const std::lock_guard lock(mutex_);
     has_field_ = space.field != nullptr;
     if (has_field_) next_field_ = *space.field;
+    if (space.revoked != nullptr) next_revoked_ = *space.revoked;
     next_space_ = space;
     next_body_ = body;
     next_clearance_ = guardian_clearance;
-    if (!free_mask.empty()) std::copy(free_mask.begin(), free_mask.end(), next_free_.begin());
+    std::copy(voxels.begin(), voxels.end(), next_free_.begin());
     fresh_ = true;
   }
   /// From the loop thread, when a job's completion is dispatched.
@@ -43,6 +49,10 @@ class PublishedSpace {
     field_ = next_field_;
     space_ = next_space_;
     space_.field = has_field_ ? &field_ : nullptr;
+    if (space_.revoked != nullptr) {
+      revoked_ = next_revoked_;
+      space_.revoked = &revoked_;
+    }
     mapped_ = has_field_;
     body_ = next_body_;
     clearance_ = next_clearance_;
@@ -56,7 +66,8 @@ class PublishedSpace {
   /// Whether there is a map; before, the safe zone's cylinder is all that is free. Loop thread.
   [[nodiscard]] bool mapped() const { return mapped_; }
   [[nodiscard]] const GridGeometry& geometry() const { return field_.geometry(); }
-  [[nodiscard]] bool free_for_motion(std::size_t voxel) const { return free_[voxel] != 0; }
+  [[nodiscard]] bool free_for_motion(std::size_t voxel) const { return free_[voxel] == kFreeVoxel; }
+  [[nodiscard]] bool zone_revoked(std::size_t voxel) const { return free_[voxel] == kRevokedVoxel; }
   [[nodiscard]] const FreeSpace& space() const { return space_; }
   /// What the guardian requires at least, whatever limits the body: its margins are beyond this.
   [[nodiscard]] double required_m() const { return std::min(clearance_.voxels_m, clearance_.surface_m); }
@@ -67,6 +78,7 @@ class PublishedSpace {
   bool has_field_ = false;
   bool mapped_ = false;
   DistanceField next_field_, field_;
+  DistanceField next_revoked_, revoked_;
   FreeSpace next_space_, space_;
   Body next_body_, body_;
   Clearance next_clearance_, clearance_;

@@ -10,6 +10,8 @@ namespace {
 constexpr double kFieldMax_m = 0.6;        // farther is as good as free: the largest body radius and clearance are below
 constexpr double kZoneMargin_m = 0.10;     // stopping distance and a voxel, as the reach zone wants
 constexpr std::size_t kViewRecordsMax = 512;
+constexpr double kRoomToSpare_m = 0.015;   // beyond rule 5 when there is a choice: surfaces flicker by parts of a voxel
+constexpr double kSlowSpeed_m_s = 0.05;    // stops within 1.3 mm instead of 16.5
 
 DepthSensor sensor_of(const Config& config, const hal::DepthCamera& camera) {
   return {camera.intrinsics(), config.depth.range_min_m, config.depth.range_max_m, config.depth.range_trusted_m,
@@ -70,6 +72,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       field_(geometry, kFieldMax_m),
       free_mask_(geometry.count(), 0),
       zone_(geometry.count(), 0),
+      revoked_field_(geometry, kFieldMax_m),
       chooser_(geometry, sensor_of(config, depth), config.explore.candidates, workers.workers(),
                config.explore.certificate_samples),
       published_(geometry, kFieldMax_m) {
@@ -92,11 +95,11 @@ Status Workbench::take_memory() {
     return {};
   };
   const DepthSensor& sensor = inserter_.sensor();
-  const std::size_t snapshot = DistanceField::required_bytes(g) + g.count();
+  const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 2 * g.count()},
            std::pair{memory::Pool::kDistanceField,
-                     DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
+                     2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
            std::pair{memory::Pool::kViewCandidates,
                      ViewChooser::required_bytes(g, config_.explore.candidates, 2, config_.explore.certificate_samples)},
@@ -131,22 +134,21 @@ FreeSpace Workbench::space_of(MotionPhase phase) const {
   FreeSpace space;
   space.field = phase == MotionPhase::kMapping ? &field_ : nullptr;
   space.zone = zone_cylinder_;
-  space.zone_intact = zone_intact_;
+  space.revoked = any_revoked_ ? &revoked_field_ : nullptr;
   for (const Config::KeepOut& box : config_.keep_out) {
     space.keep_out_boxes.push_back({vector_of(box.low_m), vector_of(box.high_m)});
   }
   return space;
 }
 
-Clearance Workbench::clearance_of(MotionPhase phase) const {
-  return phase == MotionPhase::kMapping && mapping_terms_ ? mapping_terms_->clearance() : blind_terms_.clearance();
-}
-
-ViewTiming Workbench::timing() const {
-  ViewTiming timing;
-  timing.limits = limits_;
-  timing.settle_s = config_.calibration.settle_time_s;
-  return timing;
+std::array<Workbench::Pace, 3> Workbench::mapping_paces() const {
+  const Clearance normal = mapping_terms_->clearance();
+  const Clearance slow = slow_terms_.clearance();
+  Clearance roomy = normal;
+  roomy.voxels_m += kRoomToSpare_m;
+  SpeedLimits slow_limits = limits_;
+  slow_limits.body_speed_m_s = std::min(kSlowSpeed_m_s, limits_.body_speed_m_s);
+  return {{{roomy, normal, limits_}, {normal, normal, limits_}, {slow, slow, slow_limits}}};
 }
 
 /// After the calibration is accepted: its clearance, the body with the camera where it is, and the zone to be mapped.
@@ -155,6 +157,9 @@ void Workbench::begin_mapping() {
   in.sigma_hand_eye_m = hand_eye_->sigma_translation_m.maxCoeff();
   in.sigma_hand_eye_rad = hand_eye_->sigma_rotation_rad.maxCoeff();
   mapping_terms_ = required_clearance(in);
+  in.speed_m_s = std::min(kSlowSpeed_m_s, in.speed_m_s);
+  slow_terms_ = required_clearance(in);
+  clearance_in_force_ = mapping_terms_->clearance();
   camera_body_ = body_with_camera(arm_, hand_eye_->flange_T_camera);
   mark_reach_zone(map_.geometry(), arm_, camera_body_.capsules, kZoneMargin_m, config_.map.low_m[2], zone_);
   unknown_before_ = zone_counts().unknown;
@@ -175,11 +180,14 @@ VoxelCounts Workbench::zone_counts() const {
 }
 
 void Workbench::rebuild_free_space(double now_s) {
+  if (mapping_terms_) revoke_zone();
   map_.free_mask(now_s, config_.map.free_max_age_s, free_mask_);
   field_.rebuild(free_mask_);
   if (!mapping_terms_) return;
   mapping_space_ = space_of(MotionPhase::kMapping);
-  mapping_clearance_ = mapping_terms_->clearance();
+  for (std::size_t i = 0; i < free_mask_.size(); ++i) {
+    if (map_.zone_revoked(i)) free_mask_[i] = PublishedSpace::kRevokedVoxel;
+  }
   published_.publish(mapping_space_, camera_body_,
                      guardian_clearance(mapping_terms_->clearance(), mapping_terms_->stopping_m), free_mask_);
 }
@@ -189,9 +197,22 @@ void Workbench::forget_known_free() {
   rebuild_free_space(last_stamp_s_);
 }
 
-ViewContext Workbench::context() const {
-  return {arm_,  camera_body_, mapping_space_, mapping_clearance_,
-          map_, zone_,        hand_eye_->flange_T_camera * facts_.camera_T_depth};
+/// After hits inside the safe zone: the zone counts only away from them. Voxels that its cylinder cuts through have no
+/// flag of their own; there an occupied one takes the zone away.
+void Workbench::revoke_zone() {
+  const GridGeometry& g = map_.geometry();
+  const double half_diagonal = 0.5 * std::sqrt(3.0) * g.resolution_m;
+  for (std::size_t i = 0; i < free_mask_.size(); ++i) {
+    const bool in_reach_of_zone = zone_cylinder_.depth_m(g.center_m(g.voxel_at(i))) > -half_diagonal;
+    const bool taken = in_reach_of_zone && (map_.zone_revoked(i) || map_.voxel_class(i) == VoxelClass::kOccupied);
+    free_mask_[i] = taken ? 0 : 1;
+    any_revoked_ = any_revoked_ || taken;
+  }
+  if (any_revoked_) revoked_field_.rebuild(free_mask_);
+}
+
+ViewContext Workbench::context(const Clearance& clearance) const {
+  return {arm_, camera_body_, mapping_space_, clearance, map_, zone_, hand_eye_->flange_T_camera * facts_.camera_T_depth};
 }
 
 }  // namespace firstlook

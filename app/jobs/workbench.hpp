@@ -94,12 +94,20 @@ class Workbench {
 
   [[nodiscard]] const Body& body_of(MotionPhase phase) const;
   [[nodiscard]] FreeSpace space_of(MotionPhase phase) const;
-  [[nodiscard]] Clearance clearance_of(MotionPhase phase) const;
-  [[nodiscard]] Route route_of(const Path& path, const Body& body) const;
-  [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, MotionPhase phase,
-                                        double* margin_m = nullptr) const;
-  [[nodiscard]] ViewContext context() const;
-  [[nodiscard]] ViewTiming timing() const;
+  /// How a mapping motion is asked for: first with room to spare, so that voxels that flicker do not block it; then with
+  /// the clearance of safety rule 5; then slowly, which needs less room to stop.
+  struct Pace {
+    Clearance plan;       ///< to choose and plan with
+    Clearance in_force;   ///< that the path must keep while it is driven
+    SpeedLimits limits;
+  };
+  [[nodiscard]] std::array<Pace, 3> mapping_paces() const;
+  void revoke_zone();
+  [[nodiscard]] Route route_of(const Path& path, const Body& body, const SpeedLimits& limits) const;
+  [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
+  [[nodiscard]] ViewContext context(const Clearance& clearance) const;
+  [[nodiscard]] NextViewResult sweep_at(const Pace& pace, const FromHere& here);
+  [[nodiscard]] NextViewResult explore_at(const Pace& pace, const FromHere& here);
 
   [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
   [[nodiscard]] Result<CornerSet> averaged_corners(const DetectArguments& arguments);
@@ -112,7 +120,7 @@ class Workbench {
   void rebuild_free_space(double now_s);
   void note_view(const IntegrateArguments& arguments, std::uint64_t gained);
   [[nodiscard]] VoxelCounts zone_counts() const;
-  void take_choice(NextViewResult& result, const Path& path, double gain);
+  void take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace);
 
   Config config_;
   CellFacts facts_;
@@ -129,6 +137,8 @@ class Workbench {
   Body camera_body_;
   ClearanceTerms blind_terms_;                    ///< before the calibration: no measurement is involved
   std::optional<ClearanceTerms> mapping_terms_;
+  ClearanceTerms slow_terms_;                     ///< mapping at kSlowSpeed: less room to stop
+  Clearance clearance_in_force_;                  ///< what the path under way was certified with
 
   memory::PoolBuffer<std::uint8_t> gray_;
   memory::PoolBuffer<std::uint16_t> depth_pixels_;
@@ -140,6 +150,7 @@ class Workbench {
   std::vector<Observation> observations_;
   Turns bootstrap_;
   std::size_t bootstrap_next_ = 0;
+  std::size_t bootstrap_centers_ = 0;             ///< views around which bootstrap views were made
   std::optional<HandEyeResult> hand_eye_;
 
   VoxelMap map_;
@@ -147,9 +158,9 @@ class Workbench {
   DistanceField field_;
   std::vector<std::uint8_t> free_mask_;
   std::vector<std::uint8_t> zone_;
-  bool zone_intact_ = true;
+  DistanceField revoked_field_;  ///< of the safe zone's voxels that a hit took away
+  bool any_revoked_ = false;
   FreeSpace mapping_space_;      ///< as rebuilt last
-  Clearance mapping_clearance_;
   ViewChooser chooser_;
   std::optional<SweepProgress> sweep_;
   PublishedSpace published_;

@@ -10,12 +10,12 @@
 namespace firstlook::sim {
 
 struct BodyHit {
-  double depth_m = 0;                                    ///< along the optical axis
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();      ///< unit, in the camera frame
+  double depth_m = 0;                                ///< along the optical axis
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, in the camera frame
 };
 
-/// Capsules in the frame of an eye that looks along z. Those that hold `eye` or `also_outside` are left out: a camera does
-/// not see its own housing.
+/// Capsules in the frame of an eye that looks along z. Those that hold `eye` or `also_outside` are left out: a camera
+/// does not see its own housing.
 class BodyImage {
  public:
   BodyImage(const Capsules& body, const Pose& base_T_eye, const Eigen::Vector3d& also_outside_m);

@@ -51,7 +51,8 @@ regions:
   - {name: inside_opening, low_m: [0.80, 0.15, -0.05], high_m: [1.10, 0.48, 0.28]}
 )";
 
-constexpr std::string_view kMachineTending = R"(# A lathe with its door open, a pallet, a conveyor, a fence and a window that gives no depth.
+constexpr std::string_view kMachineTending =
+    R"(# A lathe with its door open, a pallet, a conveyor, a fence and a window that gives no depth.
 walls: {low_m: [-2.3, -2.0], high_m: [2.4, 2.3], height_m: 2.8}
 board: {center_m: [0.17, -0.98, 0.42], faces: [-0.17, 0.98, 0.35]}
 solids:
@@ -102,7 +103,8 @@ regions:
   - {name: behind_carton, low_m: [1.00, -0.55, 0.00], high_m: [1.15, -0.35, 0.20]}
 )";
 
-constexpr std::string_view kHall = R"(# An open hall: no wall within the sensor's range, so most pixels get nothing back.
+constexpr std::string_view kHall =
+    R"(# An open hall: no wall within the sensor's range, so most pixels get nothing back.
 board: {center_m: [0.99, -0.16, 0.42], faces: [-0.99, 0.16, 0.35]}
 solids:
   - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [1.06, -0.17, -0.245]}

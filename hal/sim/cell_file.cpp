@@ -60,8 +60,8 @@ class Section {
       const std::string key = entry.first.as<std::string>();
       if (!met.insert(key).second) fail(entry.first, "{} stands twice", inside(key));
       if (std::ranges::find(keys, key) != keys.end()) continue;
-      const std::string_view nearest = *std::ranges::min_element(
-          keys, {}, [&](std::string_view known) { return edits_between(key, known); });
+      const std::string_view nearest =
+          *std::ranges::min_element(keys, {}, [&](std::string_view known) { return edits_between(key, known); });
       fail(entry.first, "unknown key {}; the nearest is '{}'", inside(key), nearest);
     }
   }
@@ -225,8 +225,8 @@ void read_room(const Section& cell, Scene& scene) {
       wall("ceiling", {low.x() - t, low.y() - t, high.z()}, {high.x() + t, high.y() + t, high.z() + t});
     }
   }
-  scene.solids.push_back(plain_box("floor", {low.x() - t, low.y() - t, floor - t}, {high.x() + t, high.y() + t, floor},
-                                   kFloorColor));
+  scene.solids.push_back(
+      plain_box("floor", {low.x() - t, low.y() - t, floor - t}, {high.x() + t, high.y() + t, floor}, kFloorColor));
 }
 
 void read_cart(const Section& cell, Scene& scene) {
@@ -264,8 +264,8 @@ Pose board_orientation(const Vector3d& faces, const Vector3d& center, double rol
 
 void read_board(const Section& cell, Scene& scene) {
   const Section board(cell.file(), cell.child("board"), "board",
-                      {"center_m", "faces", "roll_deg", "inner_columns", "inner_rows", "square_size_m", "white_margin_m",
-                       "thickness_m"});
+                      {"center_m", "faces", "roll_deg", "inner_columns", "inner_rows", "square_size_m",
+                       "white_margin_m", "thickness_m"});
   BoardPlacement& placed = scene.board;
   placed.spec.inner_columns = board.integer_or("inner_columns", placed.spec.inner_columns, 3, 85);
   placed.spec.inner_rows = board.integer_or("inner_rows", placed.spec.inner_rows, 3, 85);
@@ -316,11 +316,13 @@ void read_camera(const Section& cell, Scene& scene, const ArmModel& arm, std::ui
     if (camera.has("rpy_deg")) mount.link_T_camera.linear() = given.linear();
     read_intrinsics(camera, "color", mount.color);
     read_intrinsics(camera, "depth", mount.depth);
-    if (mount.depth.k1 != 0 || mount.depth.k2 != 0 || mount.depth.p1 != 0 || mount.depth.p2 != 0 || mount.depth.k3 != 0) {
+    if (mount.depth.k1 != 0 || mount.depth.k2 != 0 || mount.depth.p1 != 0 || mount.depth.p2 != 0 ||
+        mount.depth.k3 != 0) {
       camera.fail(camera.child("depth"), "depth images come without distortion");
     }
-    mount.camera_T_depth = Transform<Camera, Depth>(
-        Eigen::Quaterniond::Identity(), camera.vector_or("depth_position_m", mount.camera_T_depth.translation(), -1, 1));
+    mount.camera_T_depth =
+        Transform<Camera, Depth>(Eigen::Quaterniond::Identity(),
+                                 camera.vector_or("depth_position_m", mount.camera_T_depth.translation(), -1, 1));
     if (camera.flag_or("exact", false)) return;
   }
   mount.link_T_camera = assembled(mount.link_T_camera, seed);

@@ -10,9 +10,9 @@
 
 namespace firstlook::sim {
 
-/// The cell of a name (`built_in_cell_names`, "random:SEED") or of a YAML file. `seed` is the run's: it turns and shifts the
-/// true camera mount a little, so that no two seeds have the same answer.
-/// Errors: kDataMissing for a file that cannot be opened, kCellInvalid (with line and column) for one that cannot be used.
+/// The cell of a name (`built_in_cell_names`, "random:SEED") or of a YAML file. `seed` is the run's: it turns and
+/// shifts the true camera mount a little, so that no two seeds have the same answer. Errors: kDataMissing for a file
+/// that cannot be opened, kCellInvalid (with line and column) for one that cannot be used.
 [[nodiscard]] Result<Scene> load_cell(std::string_view name_or_file, std::uint64_t seed);
 
 /// The same from YAML text; `name` stands in front of errors and becomes the scene's name. Keys: hal/sim/README.md.

@@ -15,8 +15,8 @@ using Eigen::Vector3d;
 
 constexpr float kWhite = 0.85F, kBlack = 0.06F;  // printed paper
 constexpr double kGrayOfFullLight = 255;
-constexpr float kBlurSigma_px = 0.6F;   // of lens and sensor together, a webcam in focus
-constexpr float kNoiseSigma = 2.0F;     // grey levels
+constexpr float kBlurSigma_px = 0.6F;  // of lens and sensor together, a webcam in focus
+constexpr float kNoiseSigma = 2.0F;    // grey levels
 constexpr float kBodyReflectance = 0.55F;
 constexpr std::uint64_t kGrayNoise = 2, kSampleJitter = 3;
 constexpr int kBoardSamples = 8;   // in each direction, where a pixel sees nothing but the board: by formula
@@ -238,8 +238,7 @@ class ColorFrame {
 float board_reflectance(const BoardPlacement& board, double x_m, double y_m) {
   const int column = static_cast<int>(std::floor(x_m / board.spec.square_size_m));
   const int row = static_cast<int>(std::floor(y_m / board.spec.square_size_m));
-  const bool on_pattern =
-      column >= -1 && row >= -1 && column < board.spec.inner_columns && row < board.spec.inner_rows;
+  const bool on_pattern = column >= -1 && row >= -1 && column < board.spec.inner_columns && row < board.spec.inner_rows;
   return on_pattern && (column + row) % 2 == 0 ? kBlack : kWhite;
 }
 

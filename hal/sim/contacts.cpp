@@ -126,7 +126,7 @@ void ContactMonitor::occupy(const Capsule& placed, const Eigen::Vector3i& voxel,
   const bool entered = last + 1 != check_number_;
   const bool known = !entered || view_->free_for_motion(index);
   // Excused for the part that overlaps it now; asked again for every other capsule and at every check.
-  if (!known && view_->zone_intact() && in_zone(placed, voxel)) return;
+  if (!known && !view_->zone_revoked(index) && in_zone(placed, voxel)) return;
   last = check_number_;
   if (!known) ++unknown_entries_;
 }

@@ -101,7 +101,8 @@ class DepthFrame {
       const float z = depth_[first + i];
       row.t[i] = strength_[first + i] > 0 ? 1 - kShadowSlack_m / z : 0;
       if (row.t[i] <= 0) continue;
-      const Eigen::Vector3f d = rotation * Eigen::Vector3f(rays_.x[first + i] * z - baseline, rays_.y[first + i] * z, z);
+      const Eigen::Vector3f d =
+          rotation * Eigen::Vector3f(rays_.x[first + i] * z - baseline, rays_.y[first + i] * z, z);
       row.x[i] = d.x(), row.y[i] = d.y(), row.z[i] = d.z();
     }
     tracer_.find_blocked(projector_in_base_, row, row.size(), shaded);

@@ -10,8 +10,8 @@
 namespace firstlook::sim {
 
 /// Fills `out` (millimetres along the optical axis, 0 without return), which has the size of `rays.camera`.
-/// `full_camera` is the sensor's own resolution: quantisation, noise and edges are those of its pixels, also when `rays`
-/// are fewer.
+/// `full_camera` is the sensor's own resolution: quantisation, noise and edges are those of its pixels, also when
+/// `rays` are fewer.
 void render_depth_image(const Scene& scene, const RayTracer& tracer, const DepthSensorModel& sensor,
                         const PixelRays& rays, const CameraIntrinsics& full_camera,
                         const Transform<Base, Depth>& base_T_depth, const Exposure& exposure,

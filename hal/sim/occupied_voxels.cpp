@@ -94,7 +94,8 @@ void mark(const Solid& solid, const GridGeometry& grid, std::vector<std::uint8_t
         std::uint8_t& voxel = out[grid.index(v)];
         if (voxel != 0) continue;
         const Vector3d center = grid.center_m(v);
-        voxel = std::visit([&](const auto& shape) { return overlaps(shape, solid, center, half); }, solid.shape) ? 1 : 0;
+        voxel =
+            std::visit([&](const auto& shape) { return overlaps(shape, solid, center, half); }, solid.shape) ? 1 : 0;
       }
     }
   }

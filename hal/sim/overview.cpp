@@ -16,8 +16,12 @@ using Eigen::Vector3d;
 class OverviewPainter {
  public:
   OverviewPainter(const Scene& scene, const RayTracer& tracer, const Capsules& body, const Pose& base_T_eye)
-      : scene_(scene), tracer_(tracer), base_T_eye_(base_T_eye), body_(body),
-        seen_body_(body, base_T_eye, base_T_eye.translation()), toward_(scene.light.toward) {}
+      : scene_(scene),
+        tracer_(tracer),
+        base_T_eye_(base_T_eye),
+        body_(body),
+        seen_body_(body, base_T_eye, base_T_eye.translation()),
+        toward_(scene.light.toward) {}
 
   [[nodiscard]] Vector3d paint(const RayRow& row, std::size_t i, double x, double y) const {
     constexpr double kSky = 0.93;
@@ -55,9 +59,8 @@ class OverviewPainter {
     constexpr double kLampDistance_m = 1.5;
     if (tracer_.distance_m(point, toward_) < kLampDistance_m) return true;
     const Vector3d end = point + kLampDistance_m * toward_;
-    return std::ranges::any_of(body_, [&](const Capsule& c) {
-      return segment_distance_m(c.a, c.b, point, end) < c.radius_m;
-    });
+    return std::ranges::any_of(body_,
+                               [&](const Capsule& c) { return segment_distance_m(c.a, c.b, point, end) < c.radius_m; });
   }
 
   const Scene& scene_;
@@ -104,8 +107,10 @@ Overview paint_overview(const Scene& scene, const RayTracer& tracer, const Vecto
     }
     for (std::size_t i = 0; i < line.size() * 3; ++i) {
       // sRGB's gamma, nearly: what a person sees on a screen.
-      const double value = std::pow(std::clamp(line[i / 3][static_cast<int>(i % 3)] / (kSamples * kSamples), 0.0, 1.0), 0.7);
-      picture.rgb[static_cast<std::size_t>(r) * line.size() * 3 + i] = static_cast<std::uint8_t>(std::lround(255 * value));
+      const double value =
+          std::pow(std::clamp(line[i / 3][static_cast<int>(i % 3)] / (kSamples * kSamples), 0.0, 1.0), 0.7);
+      picture.rgb[static_cast<std::size_t>(r) * line.size() * 3 + i] =
+          static_cast<std::uint8_t>(std::lround(255 * value));
     }
   }
   return picture;

@@ -1,4 +1,5 @@
-/// Random numbers that belong to a pixel: the same whatever was drawn before, so the order of rendering does not matter.
+/// Random numbers that belong to a pixel: the same whatever was drawn before, so the order of rendering does not
+/// matter.
 #pragma once
 
 #include <array>

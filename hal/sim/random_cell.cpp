@@ -17,8 +17,8 @@ using Eigen::Vector3d;
 constexpr double kPi = std::numbers::pi;
 constexpr std::uint64_t kAssemblyStream = 5011, kLayoutStream = 5012, kViewsStream = 5013;
 constexpr double kFloor_m = -0.85, kCartTop_m = -0.02;
-constexpr double kZoneMargin_m = 0.05;       // between the safe zone and everything that is drawn
-constexpr double kClearance_m = 0.05;        // of a view to the zone's surface: what a certificate asks for and some more
+constexpr double kZoneMargin_m = 0.05;  // between the safe zone and everything that is drawn
+constexpr double kClearance_m = 0.05;   // of a view to the zone's surface: what a certificate asks for and some more
 constexpr double kViewTiltMax_rad = 50 * kPi / 180, kViewTiltMin_rad = 10 * kPi / 180;
 constexpr double kDiverse_rad = 20 * kPi / 180;
 constexpr int kDrawsMax = 64, kPlaceTriesMax = 50, kViewTries = 30000;
@@ -46,7 +46,8 @@ Solid upright_cylinder(const char* name, const Vector3d& center, double radius, 
 /// Draws the parts of one cell, one after the other.
 class Layout {
  public:
-  Layout(std::uint64_t cell_seed, int draw) : random_(mix64(cell_seed), kLayoutStream + 1000 * static_cast<std::uint64_t>(draw)) {}
+  Layout(std::uint64_t cell_seed, int draw)
+      : random_(mix64(cell_seed), kLayoutStream + 1000 * static_cast<std::uint64_t>(draw)) {}
 
   Scene draw() {
     scene_.start_rad = default_start(*find_arm_model(scene_.arm_model));
@@ -78,7 +79,8 @@ class Layout {
       add(box("wall", {middle.x(), at.y() + out, middle.z()}, {size.x(), t, size.z()}, 0), 0.66F);
     }
     if (random_.uniform() < 0.7) {
-      add(box("ceiling", {middle.x(), middle.y(), high.z() + 0.5 * t}, {size.x() + 2 * t, size.y() + 2 * t, t}, 0), 0.75F);
+      add(box("ceiling", {middle.x(), middle.y(), high.z() + 0.5 * t}, {size.x() + 2 * t, size.y() + 2 * t, t}, 0),
+          0.75F);
     }
     const double height = kCartTop_m - kFloor_m;
     add(box("cart", {0, 0, kCartTop_m - 0.5 * height}, {0.8, 0.6, height}, 0), 0.35F);
@@ -124,8 +126,10 @@ class Layout {
       const double leg_height = top - size.z() - kFloor_m;
       std::vector<Solid> parts{box("table", {at.x(), at.y(), top - 0.5 * size.z()}, size, yaw)};
       for (const double side : {-1.0, 1.0}) {
-        const Vector3d leg = at + Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Vector3d(side * (0.5 * size.x() - 0.03), 0, 0);
-        parts.push_back(box("table side", {leg.x(), leg.y(), kFloor_m + 0.5 * leg_height}, {0.04, size.y() - 0.1, leg_height}, yaw));
+        const Vector3d leg =
+            at + Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Vector3d(side * (0.5 * size.x() - 0.03), 0, 0);
+        parts.push_back(box("table side", {leg.x(), leg.y(), kFloor_m + 0.5 * leg_height},
+                            {0.04, size.y() - 0.1, leg_height}, yaw));
       }
       if (!place(parts)) continue;
       tables_.push_back({{at.x(), at.y(), top}, size, yaw});
@@ -175,7 +179,8 @@ class Layout {
     pose.translation() = at;
     const Vector3d post = pose * Vector3d(0, 0, 0.05);
     const double height = post.z() - kFloor_m;
-    scene_.solids.push_back(upright_cylinder("board's post", {post.x(), post.y(), kFloor_m + 0.5 * height}, 0.015, height));
+    scene_.solids.push_back(
+        upright_cylinder("board's post", {post.x(), post.y(), kFloor_m + 0.5 * height}, 0.015, height));
     pose.translate(-scene_.board.spec.center());
     scene_.board.base_T_board = Transform<Base, Board>(pose);
     scene_.board_solid = scene_.solids.size();
@@ -227,15 +232,16 @@ int diverse_views(const Scene& scene, const ArmModel& arm, const std::vector<Joi
     const Transform<Base, Camera> pose = camera_pose(scene, forward(arm, q));
     if (view_tilt_rad(scene, pose) < kViewTiltMin_rad) continue;
     const Eigen::Quaterniond turn = pose.quaternion();
-    if (std::ranges::all_of(kept, [&](const Eigen::Quaterniond& k) { return k.angularDistance(turn) > kDiverse_rad; })) {
+    if (std::ranges::all_of(kept,
+                            [&](const Eigen::Quaterniond& k) { return k.angularDistance(turn) > kDiverse_rad; })) {
       kept.push_back(turn);
     }
   }
   return static_cast<int>(kept.size());
 }
 
-/// A job begins by looking around: a tenth of a turn at a time, level and with the wrist tilted up and down. One of these
-/// views must see the board whole.
+/// A job begins by looking around: a tenth of a turn at a time, level and with the wrist tilted up and down. One of
+/// these views must see the board whole.
 bool is_found_by_turning(const Scene& scene, const ArmModel& arm, const Renderer& renderer) {
   const Body body = body_with_envelope(arm);
   const Capsules hiding = true_body(arm);
@@ -299,7 +305,8 @@ Result<Scene> make_random_cell(std::uint64_t cell_seed, std::uint64_t seed) {
     const std::vector<JointVector> views = board_views(scene, kViewTries, cell_seed);
     if (diverse_views(scene, arm, views) >= kDiverseViewsMin) return scene;
   }
-  return failure(Fault::kCellInvalid, "random:{}: no draw of {} shows its board to the safe zone", cell_seed, kDrawsMax);
+  return failure(Fault::kCellInvalid, "random:{}: no draw of {} shows its board to the safe zone", cell_seed,
+                 kDrawsMax);
 }
 
 }  // namespace firstlook::sim

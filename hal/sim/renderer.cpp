@@ -20,17 +20,21 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kFastBinning = 4;
-constexpr double kEndSlack_m = 0.001;        // a point on a surface is not hidden by that surface
-constexpr double kBoardTiltMax_rad = 1.22;   // 70 degrees: squares become slivers
-constexpr double kSquareWidthMin_px = 6;     // below that no detector finds corners
+constexpr double kEndSlack_m = 0.001;       // a point on a surface is not hidden by that surface
+constexpr double kBoardTiltMax_rad = 1.22;  // 70 degrees: squares become slivers
+constexpr double kSquareWidthMin_px = 6;    // below that no detector finds corners
 constexpr std::uint64_t kCornerStream = 5001;
-
 
 }  // namespace
 
 struct Renderer::State {
   State(const Scene& s, const DepthSensorModel& d)
-      : scene(s), sensor(d), tracer(s), color(s.mount.color), depth(s.mount.depth), fast(binned(s.mount.depth, kFastBinning)) {}
+      : scene(s),
+        sensor(d),
+        tracer(s),
+        color(s.mount.color),
+        depth(s.mount.depth),
+        fast(binned(s.mount.depth, kFastBinning)) {}
   Scene scene;
   DepthSensorModel sensor;
   RayTracer tracer;
@@ -100,8 +104,8 @@ bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const
   return true;
 }
 
-hal::CornerObservation Renderer::observe_corners(const Transform<Base, Camera>& base_T_camera,
-                                                 const Exposure& exposure, double sigma_px) const {
+hal::CornerObservation Renderer::observe_corners(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
+                                                 double sigma_px) const {
   hal::CornerObservation observation;
   if (!board_in_view(base_T_camera, exposure.body)) return observation;
   const BoardPlacement& board = state_->scene.board;

@@ -15,7 +15,7 @@ namespace firstlook::sim {
 
 /// One exposure. The same view gives the same bytes, whatever was rendered before it and on which thread.
 struct Exposure {
-  Capsules body;            ///< arm and camera housing where they truly are (base coordinates); those around the eye are left out
+  Capsules body;  ///< arm and camera housing where they truly are (base coordinates); those around the eye are left out
   std::uint64_t seed = 0;   ///< of all noise, together with
   std::uint64_t frame = 0;  ///< the frame's number
 };
@@ -25,15 +25,15 @@ struct Exposure {
 struct DepthSensorModel {
   double range_min_m = 0.5;
   double range_max_m = 5.0;
-  double baseline_m = 0.075;           ///< the projector stands at x = +baseline in the Depth frame
-  double disparity_step_px = 0.125;    ///< 2.8 mm at 1 m
-  double sigma_at_1m_m = 0.00285;      ///< of noise and quantisation together; grows with z²
-  double grazing_cos_none = 0.10;      ///< no return where rays hit flatter than this
-  double grazing_cos_full = 0.25;      ///< full return where steeper; linear in between
-  double edge_step_m = 0.05;           ///< a jump to a neighbour larger than this makes an edge pixel
-  double edge_dropped = 0.5;           ///< share of edge pixels without return
-  double edge_mixed = 0.15;            ///< share with a depth between the two sides
-  double dropped = 0.002;              ///< share of all pixels without return
+  double baseline_m = 0.075;         ///< the projector stands at x = +baseline in the Depth frame
+  double disparity_step_px = 0.125;  ///< 2.8 mm at 1 m
+  double sigma_at_1m_m = 0.00285;    ///< of noise and quantisation together; grows with z²
+  double grazing_cos_none = 0.10;    ///< no return where rays hit flatter than this
+  double grazing_cos_full = 0.25;    ///< full return where steeper; linear in between
+  double edge_step_m = 0.05;         ///< a jump to a neighbour larger than this makes an edge pixel
+  double edge_dropped = 0.5;         ///< share of edge pixels without return
+  double edge_mixed = 0.15;          ///< share with a depth between the two sides
+  double dropped = 0.002;            ///< share of all pixels without return
 };
 
 enum class DepthDetail : std::uint8_t { kFull, kFast };
@@ -67,8 +67,8 @@ class Renderer {
   /// The board's corners with `sigma_px` of noise; empty unless board_in_view.
   [[nodiscard]] hal::CornerObservation observe_corners(const Transform<Base, Camera>& base_T_camera,
                                                        const Exposure& exposure, double sigma_px = 0.1) const;
-  /// True when the camera sees the whole pattern: inside the picture with `margin_px`, from the front at a tilt of at most
-  /// 70 degrees, squares at least 6 px wide, nothing in between.
+  /// True when the camera sees the whole pattern: inside the picture with `margin_px`, from the front at a tilt of at
+  /// most 70 degrees, squares at least 6 px wide, nothing in between.
   [[nodiscard]] bool board_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body,
                                    double margin_px = 8) const;
 

@@ -76,7 +76,8 @@ Triangle triangle(const Mesh& mesh, const std::array<std::uint32_t, 3>& t) {
   return {mesh.vertices_m[t[0]], mesh.vertices_m[t[1]], mesh.vertices_m[t[2]]};
 }
 
-/// Where the line from `a` along `d` crosses the triangle, in units of d (Moeller and Trumbore 1997); negative: nowhere ahead.
+/// Where the line from `a` along `d` crosses the triangle, in units of d (Moeller and Trumbore 1997); negative: nowhere
+/// ahead.
 double crossing(const Triangle& t, const Vector3d& a, const Vector3d& d) {
   const Vector3d e1 = t.b - t.a, e2 = t.c - t.a;
   const Vector3d h = d.cross(e2);

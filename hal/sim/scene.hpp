@@ -50,7 +50,8 @@ struct Solid {
   Surface surface;
 };
 
-/// The printed board on a thin panel. Its front is the plane z = 0 of the board frame; the panel lies behind it (z > 0).
+/// The printed board on a thin panel. Its front is the plane z = 0 of the board frame; the panel lies behind it (z >
+/// 0).
 struct BoardPlacement {
   BoardSpec spec;
   Transform<Base, Board> base_T_board;
@@ -60,7 +61,7 @@ struct BoardPlacement {
 
 /// Where the cameras truly sit, and what they truly are.
 struct CameraMount {
-  int link = 6;                          ///< that carries the camera; 0: fixed in the cell
+  int link = 6;                           ///< that carries the camera; 0: fixed in the cell
   Pose link_T_camera = Pose::Identity();  ///< with link 0: base_T_camera
   Transform<Camera, Depth> camera_T_depth;
   CameraIntrinsics color;
@@ -71,7 +72,8 @@ struct CameraMount {
   [[nodiscard]] Transform<Flange, Camera> flange_T_camera() const { return Transform<Flange, Camera>(link_T_camera); }
 };
 
-/// A first Kinect on the last of `joints` links: 640x480, the colour camera looking along z, 7 cm to the side and 6 cm ahead.
+/// A first Kinect on the last of `joints` links: 640x480, the colour camera looking along z, 7 cm to the side and 6 cm
+/// ahead.
 [[nodiscard]] CameraMount default_mount(int joints);
 
 /// A part of the cell that reports and tests ask for by name: a box in base coordinates.
@@ -98,7 +100,7 @@ struct Scene {
   std::size_t board_solid = 0;  ///< which of them is the board's panel
   BoardPlacement board;
   CameraMount mount;
-  SafeZone safe_zone;           ///< its floor is the cart's top
+  SafeZone safe_zone;  ///< its floor is the cart's top
   std::vector<Region> regions;
   std::vector<Region> keep_out;
   Light light;

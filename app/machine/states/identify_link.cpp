@@ -30,6 +30,7 @@ void next_motion(Machine& m) {
 
 void enter_identify_link(Machine& m) {
   m.progress().view = 0;
+  m.progress().still_images = 0;
   m.start_job(JobKind::kIdentifyMotions, FromHere{m.progress().board_view_rad, 0, m.now().seconds()});
 }
 
@@ -49,13 +50,15 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
     m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kIdentify, p.view, m.look()});
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
     if (seen->found && seen->changed) {
-      const int joint = moved_joint(p.board_view_rad, p.views.views_rad[p.view]);
-      if (joint == m.arm().position_rad.size() - 1) {
+      // An outer joint that moved the arm but not the image lies beyond the camera; one that took the board out of view
+      // says nothing.
+      if (p.still_images == 0) {
         m.transition(StateId::kCollect);
       } else {
         m.conclude(Outcome::kCalibrationRejected, Fault::kCameraOnInnerLink);
       }
     } else {
+      if (seen->found) ++p.still_images;
       ++p.view;
       next_motion(m);
     }

@@ -59,11 +59,13 @@ TEST_CASE("the true mount depends on the seed, by no more than the assembly allo
 }
 
 TEST_CASE("a cell file says where the arm, the mount and the things are") {
-  const Result<Scene> scene = parse_cell(
-      kBoard + "arm: ur5e\ncart: {top_m: -0.05}\ncamera: {link: 6, position_m: [0.01, 0.02, 0.03], exact: true}\n"
-               "solids:\n  - {name: drum, cylinder: {radius_m: 0.2, height_m: 0.8}, position_m: [1, 1, 0], returns_depth: false}\n"
-               "keep_out:\n  - {name: people, low_m: [-2, 1, -1], high_m: [2, 2, 2]}\n",
-      "cell.yaml", 1);
+  const Result<Scene> scene =
+      parse_cell(kBoard +
+                     "arm: ur5e\ncart: {top_m: -0.05}\ncamera: {link: 6, position_m: [0.01, 0.02, 0.03], exact: true}\n"
+                     "solids:\n  - {name: drum, cylinder: {radius_m: 0.2, height_m: 0.8}, position_m: [1, 1, 0], "
+                     "returns_depth: false}\n"
+                     "keep_out:\n  - {name: people, low_m: [-2, 1, -1], high_m: [2, 2, 2]}\n",
+                 "cell.yaml", 1);
   REQUIRE(scene);
   CHECK(scene->arm_model == "ur5e");
   CHECK(scene->safe_zone.floor_m == -0.05);
@@ -86,8 +88,10 @@ TEST_CASE("a wrong cell file is refused with place and reason") {
   CHECK_THAT(complaint(kBoard + "solids:\n  - {box: {siz_m: [1, 1, 1]}}\n"), Contains(":3:") && Contains("'size_m'"));
   CHECK_THAT(complaint(kBoard + kBoard), Contains("twice"));
   CHECK_THAT(complaint(kBoard + "solids:\n  - {box: {size_m: [1, -1, 1]}, position_m: [3, 0, 0]}\n"), Contains(":3:"));
-  CHECK_THAT(complaint(kBoard + "solids:\n  - {box: {size_m: [1, .nan, 1]}, position_m: [3, 0, 0]}\n"), Contains("nan"));
-  CHECK_THAT(complaint(kBoard + "solids:\n  - {box: {size_m: [1, 1]}, position_m: [3, 0, 0]}\n"), Contains("3 numbers"));
+  CHECK_THAT(complaint(kBoard + "solids:\n  - {box: {size_m: [1, .nan, 1]}, position_m: [3, 0, 0]}\n"),
+             Contains("nan"));
+  CHECK_THAT(complaint(kBoard + "solids:\n  - {box: {size_m: [1, 1]}, position_m: [3, 0, 0]}\n"),
+             Contains("3 numbers"));
   CHECK_THAT(complaint(kBoard + "solids:\n  - {name: nothing}\n"), Contains("either 'box' or 'cylinder'"));
   CHECK_THAT(complaint(kBoard + "floor_m: deep\n"), Contains("must be a number"));
   CHECK_THAT(complaint(kBoard + "arm: kuka\n"), Contains("kuka"));
@@ -99,18 +103,20 @@ TEST_CASE("a wrong cell file is refused with place and reason") {
 
 TEST_CASE("obstacles in the safe zone are refused, to the micrometre") {
   const auto wall_at = [](double x) {
-    return kBoard + "solids:\n  - {name: wall, box: {size_m: [0.2, 1, 1]}, position_m: [" + std::to_string(x) + ", 0, 0.3]}\n";
+    return kBoard + "solids:\n  - {name: wall, box: {size_m: [0.2, 1, 1]}, position_m: [" + std::to_string(x) +
+           ", 0, 0.3]}\n";
   };
   CHECK(parse_cell(wall_at(0.60001), "cell.yaml", 1));
   CHECK(complaint(wall_at(0.5999)).find("'wall'") != std::string::npos);
   const auto above = [](double z) {
-    return kBoard + "solids:\n  - {name: lamp, box: {size_m: [4, 4, 0.2]}, position_m: [0, 0, " + std::to_string(z) + "]}\n";
+    return kBoard + "solids:\n  - {name: lamp, box: {size_m: [4, 4, 0.2]}, position_m: [0, 0, " + std::to_string(z) +
+           "]}\n";
   };
   CHECK(parse_cell(above(1.2301), "cell.yaml", 1));
   CHECK_FALSE(parse_cell(above(1.2299), "cell.yaml", 1));
-  CHECK_FALSE(parse_cell(kBoard + "solids:\n  - {box: {size_m: [5, 5, 5]}}\n", "cell.yaml", 1));        // all around
+  CHECK_FALSE(parse_cell(kBoard + "solids:\n  - {box: {size_m: [5, 5, 5]}}\n", "cell.yaml", 1));  // all around
   CHECK_FALSE(parse_cell(kBoard + "solids:\n  - {box: {size_m: [0.1, 0.1, 0.1]}, position_m: [0, 0, 0.5]}\n", "c", 1));
-  CHECK(parse_cell("board: {center_m: [0.35, 0, 0.1], faces: [-1, 0, 1]}\n", "cell.yaml", 1));           // the board may
+  CHECK(parse_cell("board: {center_m: [0.35, 0, 0.1], faces: [-1, 0, 1]}\n", "cell.yaml", 1));  // the board may
 }
 
 TEST_CASE("names that are no cell are refused") {

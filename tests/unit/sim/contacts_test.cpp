@@ -20,7 +20,7 @@ class TestView final : public KnownFreeView {
   [[nodiscard]] const GridGeometry& geometry() const override { return grid; }
   [[nodiscard]] bool free_for_motion(std::size_t voxel) const override { return free[voxel] != 0; }
   bool intact = false;
-  [[nodiscard]] bool zone_intact() const override { return intact; }
+  [[nodiscard]] bool zone_revoked(std::size_t) const override { return !intact; }
 };
 
 ContactMonitor monitor_in(const TrueWorld& world) {

@@ -17,7 +17,8 @@ TEST_CASE("random cells keep the safe zone clear, the start free and the board i
     Scene board_counts = *scene;
     board_counts.board_solid = scene->solids.size();
     CHECK(check_cell(board_counts));
-    const auto objects = std::ranges::count_if(scene->solids, [](const Solid& s) { return s.name == "box" || s.name == "cylinder"; });
+    const auto objects =
+        std::ranges::count_if(scene->solids, [](const Solid& s) { return s.name == "box" || s.name == "cylinder"; });
     CHECK(objects >= 8);  // some may find no place
     CHECK(objects <= 17);
     const ArmModel arm = *find_arm_model(scene->arm_model);

@@ -35,7 +35,8 @@ Scene wall_scene(double distance_m) {
 const Transform<Base, Depth> kOrigin;
 
 std::vector<std::uint16_t> depth_of(const Renderer& renderer, const Exposure& exposure = {},
-                                    DepthDetail detail = DepthDetail::kFull, const Transform<Base, Depth>& pose = kOrigin) {
+                                    DepthDetail detail = DepthDetail::kFull,
+                                    const Transform<Base, Depth>& pose = kOrigin) {
   const CameraIntrinsics& k = renderer.depth_intrinsics(detail);
   std::vector<std::uint16_t> image(static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
   renderer.render_depth(pose, exposure, detail, {image.data(), k.width, k.height});
@@ -120,7 +121,8 @@ TEST_CASE("dark and grazing surfaces return nothing") {
   dark.solids[1].surface.returns_depth = false;
   CHECK(statistics(depth_of(Renderer(dark))).missing == Approx(1.0));
   Scene steep = wall_scene(9.0);
-  steep.solids.push_back(box({0, 0.06, 1.5}, {2, 0.02, 2}));  // a slab seen nearly along its face: y = 0.05, z = 0.5 .. 2.5
+  steep.solids.push_back(
+      box({0, 0.06, 1.5}, {2, 0.02, 2}));  // a slab seen nearly along its face: y = 0.05, z = 0.5 .. 2.5
   const std::vector<std::uint16_t> image = depth_of(Renderer(steep));
   int met = 0;
   for (int row = 255; row < 262; ++row) met += at(image, 320, row) != 0;  // cosine 0.03 .. 0.04
@@ -169,7 +171,8 @@ TEST_CASE("rendered boards are found, and their corners are where the camera mod
     const LinkFrames frames = forward(arm, views[i]);
     const Transform<Base, Camera> pose = frames.flange() * scene->mount.flange_T_camera();
     renderer.render_color(pose, {place(true_body(arm), frames), 1, i}, {pixels.data(), camera.width, camera.height});
-    const Result<CornerSet> corners = detect_checkerboard({pixels.data(), camera.width, camera.height}, scene->board.spec);
+    const Result<CornerSet> corners =
+        detect_checkerboard({pixels.data(), camera.width, camera.height}, scene->board.spec);
     INFO("view " << i);
     REQUIRE(corners);
     const Transform<Camera, Board> camera_T_board = pose.inverse() * scene->board.base_T_board;
@@ -213,8 +216,8 @@ TEST_CASE("observed corners scatter about the truth by their sigma, and are miss
   Exposure arm_between;
   arm_between.body.push_back({between, between, 0.03, 5});
   CHECK(renderer.observe_corners(pose, arm_between).corners_px.empty());
-  const Transform<Base, Camera> from_behind(
-      Eigen::Quaterniond(pose.rotation()), Vector3d(2 * center - pose.translation()));
+  const Transform<Base, Camera> from_behind(Eigen::Quaterniond(pose.rotation()),
+                                            Vector3d(2 * center - pose.translation()));
   CHECK(renderer.observe_corners(from_behind, {}).corners_px.empty());
 }
 
