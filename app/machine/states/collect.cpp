@@ -3,7 +3,7 @@
 
 namespace firstlook::states {
 namespace {
-constexpr std::uint32_t kFailedLooksMax = 8;  // in a row
+constexpr std::uint32_t kFailedLooksMax = 24;  // in a row: the first turns are made blindly and may lose the board
 
 bool stored_calibration(Machine& m) {
   return m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;

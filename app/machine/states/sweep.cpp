@@ -25,7 +25,15 @@ void take(Machine& m, const NextViewResult& choice) {
 
 }  // namespace
 
-void enter_sweep(Machine& m) { m.start_look(true, 1); }
+/// Before the first look the arm goes back to where it started, still by the rules of the safe zone: where the last view
+/// of the board left it, the camera that is now known may be too near to the arm itself.
+void enter_sweep(Machine& m) {
+  if (m.progress().sweep_views == 0) {
+    plan_to(m, m.settings().parking_rad, MotionPhase::kBeforeCalibration);
+  } else {
+    m.start_look(true, 1);
+  }
+}
 
 Handled on_sweep(Machine& m, const MachineEvent& event) {
   Progress& p = m.progress();
@@ -37,7 +45,13 @@ Handled on_sweep(Machine& m, const MachineEvent& event) {
     case Machine::Trip::kInterrupted: m.start_look(true, 1); return Handled::kNo;
     default: break;
   }
-  if (m.advance_look(event)) {
+  if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
+    if (plan->found) {
+      m.start_trip(plan->path, false);
+    } else {
+      m.start_look(true, 1);
+    }
+  } else if (m.advance_look(event)) {
     m.integrate(m.look()[0], true);
   } else if (const auto result = m.integrate_result(event); result && result->at_view) {
     ++p.sweep_views;
