@@ -20,19 +20,27 @@ enum ExitCode { kDone = 0, kUsage = 2, kData = 3, kDevice = 4, kRejected = 5, kS
 
 int exit_code_of(const Error& error) {
   switch (error.fault) {
-    case Fault::kUsage: return kUsage;
-    case Fault::kDeviceMissing: return kDevice;
-    case Fault::kInternal: return kInternal;
-    default: return kData;
+    case Fault::kUsage:
+      return kUsage;
+    case Fault::kDeviceMissing:
+      return kDevice;
+    case Fault::kInternal:
+      return kInternal;
+    default:
+      return kData;
   }
 }
 
 int exit_code_of(const Ending& ending) {
   switch (ending.outcome) {
-    case Outcome::kDone: return kDone;
-    case Outcome::kCalibrationRejected: return kRejected;
-    case Outcome::kSafelyStopped: return kStopped;
-    case Outcome::kFaulted: return ending.fault == Fault::kDeviceMissing ? kDevice : kInternal;
+    case Outcome::kDone:
+      return kDone;
+    case Outcome::kCalibrationRejected:
+      return kRejected;
+    case Outcome::kSafelyStopped:
+      return kStopped;
+    case Outcome::kFaulted:
+      return ending.fault == Fault::kDeviceMissing ? kDevice : kInternal;
   }
   return kInternal;
 }
@@ -62,8 +70,8 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.board = {"checkerboard", cell.board_columns, cell.board_rows, cell.board_square_m};
   config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
   for (const sim::KeepOut& box : cell.keep_out) {
-    config.keep_out.push_back({{box.low_m.x(), box.low_m.y(), box.low_m.z()},
-                               {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
+    config.keep_out.push_back(
+        {{box.low_m.x(), box.low_m.y(), box.low_m.z()}, {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
   }
   if (!config.parking_rad) config.parking_rad = cell.start_rad;
 }
@@ -85,8 +93,8 @@ TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
   claims.observable.sensor_range_trusted_m = config.depth.range_trusted_m;
   claims.observable.zone_floor_m = config.map.low_m[2];
   const sim::TruthFigures figures = grader.grade(claims);
-  return {figures.hand_eye_error_mm,      figures.hand_eye_error_mrad, figures.hand_eye_mahalanobis2, figures.contacts,
-          figures.unknown_entries,        figures.coverage_of_observable, figures.false_free_voxels};
+  return {figures.hand_eye_error_mm, figures.hand_eye_error_mrad,    figures.hand_eye_mahalanobis2, figures.contacts,
+          figures.unknown_entries,   figures.coverage_of_observable, figures.false_free_voxels};
 }
 
 void narrate_result(const RunRecord& record, const std::string& folder, Narrator& narrator) {
@@ -95,20 +103,21 @@ void narrate_result(const RunRecord& record, const std::string& folder, Narrator
   if (record.hand_eye) {
     const Eigen::Vector3d t = 1000 * record.hand_eye->flange_T_camera.translation();
     const Eigen::Vector3d s = 1000 * record.hand_eye->sigma_translation_m;
-    narrator.line(fmt::format("hand-eye  x {:.2f} ± {:.2f}  y {:.2f} ± {:.2f}  z {:.2f} ± {:.2f} mm from {} views", t.x(),
-                              s.x(), t.y(), s.y(), t.z(), s.z(), record.hand_eye->views));
+    narrator.line(fmt::format("hand-eye  x {:.2f} ± {:.2f}  y {:.2f} ± {:.2f}  z {:.2f} ± {:.2f} mm from {} views",
+                              t.x(), s.x(), t.y(), s.y(), t.z(), s.z(), record.hand_eye->views));
   }
   if (record.mapping) {
     const VoxelCounts& v = record.mapping->voxels;
-    narrator.line(fmt::format("map       {} free, {} occupied, {} unknown voxels of {} m after {} views", v.free, v.occupied,
-                              v.unknown, record.mapping->resolution_m, record.mapping->views.size()));
+    narrator.line(fmt::format("map       {} free, {} occupied, {} unknown voxels of {} m after {} views", v.free,
+                              v.occupied, v.unknown, record.mapping->resolution_m, record.mapping->views.size()));
   }
   if (record.truth) {
     const TruthRecord& t = *record.truth;
-    narrator.line(fmt::format("truth     hand-eye off by {:.2f} mm, {:.2f} mrad; {} contacts, {} entries into unknown space; "
-                              "{:.1f} % of the observable voxels known",
-                              t.hand_eye_error_mm.value_or(0), t.hand_eye_error_mrad.value_or(0), t.contacts,
-                              t.unknown_entries, 100 * t.coverage_of_observable.value_or(0)));
+    narrator.line(
+        fmt::format("truth     hand-eye off by {:.2f} mm, {:.2f} mrad; {} contacts, {} entries into unknown space; "
+                    "{:.1f} % of the observable voxels known",
+                    t.hand_eye_error_mm.value_or(0), t.hand_eye_error_mrad.value_or(0), t.contacts, t.unknown_entries,
+                    100 * t.coverage_of_observable.value_or(0)));
   }
   narrator.line(fmt::format("report    {}/report.html", folder));
 }
@@ -127,8 +136,8 @@ int run_job(const RunCommand& command) {
       command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
   if (const Status prepared = prepare_run_folder(folder); !prepared) return fail(prepared.error());
 
-  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers});
+  auto cell = sim::make_simulated_cell(
+      {config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor, command.faults, config.workers});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);

@@ -107,7 +107,9 @@ bool VoxelMap::in_intact_safe_zone(std::size_t index) const {
   return has_motion_planes() && (flags_[index] & (kInSafeZone | kZoneRevoked)) == kInSafeZone;
 }
 
-bool VoxelMap::zone_revoked(std::size_t index) const { return has_motion_planes() && (flags_[index] & kZoneRevoked) != 0; }
+bool VoxelMap::zone_revoked(std::size_t index) const {
+  return has_motion_planes() && (flags_[index] & kZoneRevoked) != 0;
+}
 
 void VoxelMap::block(const AxisBox& box) {
   for (std::size_t i = 0; i < flags_.size(); ++i) {

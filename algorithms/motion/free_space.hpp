@@ -40,7 +40,7 @@ inline constexpr std::size_t kKeepOutsMax = 16;
 struct FreeSpace {
   const DistanceField* field = nullptr;  ///< null before anything is mapped
   SafeZone zone;
-  bool zone_intact = true;  ///< false: the zone does not count, the field alone does
+  bool zone_intact = true;                 ///< false: the zone does not count, the field alone does
   const DistanceField* revoked = nullptr;  ///< distance to the voxels of the zone that a hit took away; null: none
   FixedVector<KeepOutBox, kKeepOutsMax> keep_out_boxes;
   FixedVector<KeepOutPlane, kKeepOutsMax> keep_out_planes;

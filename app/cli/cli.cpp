@@ -13,7 +13,8 @@ struct ConfigFlags {
 
   void add_to(CLI::App& app) {
     app.add_option("--config", file, "configuration file (YAML)");
-    app.add_option("--cell", cell, "simulated cell: empty, workshop, machine_tending, cluttered, hall, random:SEED, or a file");
+    app.add_option("--cell", cell,
+                   "simulated cell: empty, workshop, machine_tending, cluttered, hall, random:SEED, or a file");
     app.add_option("--seed", seed, "seed of all random numbers");
     app.add_option("--workers", workers, "threads of one job (1 to 4); results do not depend on it");
   }
@@ -31,8 +32,9 @@ struct ConfigFlags {
 }  // namespace
 
 ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
-  CLI::App app{"firstlook calibrates the camera on a robot arm and maps its cell, moving only through space that it has "
-               "seen to be free."};
+  CLI::App app{
+      "firstlook calibrates the camera on a robot arm and maps its cell, moving only through space that it has "
+      "seen to be free."};
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
@@ -42,8 +44,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   std::string only = "everything", sensor = "full";
   CLI::App* run_app = app.add_subcommand("run", "the whole job, in a simulated cell");
   run_flags.add_to(*run_app);
-  run_app->add_option("--only", only, "a part of the job")
-      ->check(CLI::IsMember({"everything", "calibrate"}));
+  run_app->add_option("--only", only, "a part of the job")->check(CLI::IsMember({"everything", "calibrate"}));
   run_app->add_option("--sensor", sensor, "full pictures, or fast: coarser depth and projected corners")
       ->check(CLI::IsMember({"full", "fast"}));
   run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
@@ -54,8 +55,10 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   CalibrateCommandOptions calibrate;
   CLI::App* calibrate_app = app.add_subcommand("calibrate", "hand-eye calibration from recorded data");
-  calibrate_app->add_option("--dataset", calibrate.dataset, "folder with board.yaml and poses.csv or pairs.csv")->required();
-  calibrate_app->add_option("--solver", calibrate.solver, "closed form that starts the refinement: park-martin, tsai-lenz");
+  calibrate_app->add_option("--dataset", calibrate.dataset, "folder with board.yaml and poses.csv or pairs.csv")
+      ->required();
+  calibrate_app->add_option("--solver", calibrate.solver,
+                            "closed form that starts the refinement: park-martin, tsai-lenz");
   calibrate_app->add_flag("--strict", calibrate.strict, "exit with 5 when the calibration is rejected");
   calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");
 

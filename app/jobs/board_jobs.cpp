@@ -65,8 +65,7 @@ void Workbench::keep_picture(std::size_t observation) {
   const std::size_t pixels = gray_.size();
   if ((observation + 1) * pixels > pictures_.size()) return;
   const auto from = gray_.items();
-  std::copy(from.begin(), from.end(),
-            pictures_.items().begin() + static_cast<std::ptrdiff_t>(observation * pixels));
+  std::copy(from.begin(), from.end(), pictures_.items().begin() + static_cast<std::ptrdiff_t>(observation * pixels));
 }
 
 DetectResult Workbench::detect_board(const DetectArguments& arguments) {
@@ -122,9 +121,10 @@ CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   const double arm_sigma = std::hypot(hand_eye_->arm_sigma.translation_m, hand_eye_->arm_sigma.rotation_rad * distance);
   const double corner_sigma = std::max(hand_eye_->corner_sigma_px, 0.05);
   const Matrix6d look = corner_sigma * corner_sigma * pose->unit_covariance;
-  const double look_sigma = std::sqrt(look.topLeftCorner<3, 3>().trace() +
-                                      middle.squaredNorm() * look.bottomRightCorner<3, 3>().trace());
-  const double sigma = std::sqrt(3 * (hand_eye_sigma * hand_eye_sigma + arm_sigma * arm_sigma) + look_sigma * look_sigma);
+  const double look_sigma =
+      std::sqrt(look.topLeftCorner<3, 3>().trace() + middle.squaredNorm() * look.bottomRightCorner<3, 3>().trace());
+  const double sigma =
+      std::sqrt(3 * (hand_eye_sigma * hand_eye_sigma + arm_sigma * arm_sigma) + look_sigma * look_sigma);
   result.limit_mm = 1000 * 3 * sigma;
   result.moved = result.shift_mm > result.limit_mm;
   return result;

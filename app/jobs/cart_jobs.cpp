@@ -66,18 +66,29 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
 Duration virtual_duration(JobKind kind) {
   switch (kind) {
     case JobKind::kLocateViews:
-    case JobKind::kIdentifyMotions: return milliseconds(20);
-    case JobKind::kPlan: return milliseconds(50);
-    case JobKind::kCertifyPath: return milliseconds(5);
+    case JobKind::kIdentifyMotions:
+      return milliseconds(20);
+    case JobKind::kPlan:
+      return milliseconds(50);
+    case JobKind::kCertifyPath:
+      return milliseconds(5);
     case JobKind::kDetectBoard:
-    case JobKind::kCheckBoard: return milliseconds(150);
-    case JobKind::kNextCalibrationView: return milliseconds(500);
-    case JobKind::kSolve: return milliseconds(300);
-    case JobKind::kValidate: return milliseconds(1500);
-    case JobKind::kIntegrate: return milliseconds(80);
-    case JobKind::kNextSweepView: return milliseconds(100);
-    case JobKind::kNextView: return milliseconds(500);
-    case JobKind::kSummarize: return milliseconds(500);
+    case JobKind::kCheckBoard:
+      return milliseconds(150);
+    case JobKind::kNextCalibrationView:
+      return milliseconds(500);
+    case JobKind::kSolve:
+      return milliseconds(300);
+    case JobKind::kValidate:
+      return milliseconds(1500);
+    case JobKind::kIntegrate:
+      return milliseconds(80);
+    case JobKind::kNextSweepView:
+      return milliseconds(100);
+    case JobKind::kNextView:
+      return milliseconds(500);
+    case JobKind::kSummarize:
+      return milliseconds(500);
   }
   return milliseconds(100);
 }

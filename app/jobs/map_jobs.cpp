@@ -67,8 +67,7 @@ void Workbench::note_view(const IntegrateArguments& arguments, std::uint64_t gai
 SummarizeResult Workbench::summarize() {
   SummarizeResult result;
   if (!mapped() || !hand_eye_) return result;
-  const auto clusters =
-      find_remaining(map_, zone_, static_cast<std::size_t>(config_.explore.cluster_voxels_min));
+  const auto clusters = find_remaining(map_, zone_, static_cast<std::size_t>(config_.explore.cluster_voxels_min));
   ReasonOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
   const ViewContext view_context = context(clearance_in_force_);

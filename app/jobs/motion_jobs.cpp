@@ -33,8 +33,7 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
   const auto plan_at = [&](const FreeSpace& space, const Pace& pace) {
     const Body& body = body_of(arguments.phase);
     options.limits = pace.limits;
-    const auto path =
-        planner_.plan(arm_, body, space, pace.plan, arguments.from_rad, arguments.to_rad, options);
+    const auto path = planner_.plan(arm_, body, space, pace.plan, arguments.from_rad, arguments.to_rad, options);
     if (!path) {
       result.fault = path.error().fault;
       return;
@@ -85,8 +84,8 @@ NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
   }
   const ViewContext view_context = context(pace.plan);
   chooser_.gain().prepare(view_context);
-  const auto step = next_sweep_step(*sweep_, view_context, chooser_.gain(), chooser_.first_worker(), planner_,
-                                    here.at_rad, options);
+  const auto step =
+      next_sweep_step(*sweep_, view_context, chooser_.gain(), chooser_.first_worker(), planner_, here.at_rad, options);
   if (!step) {
     result.blocked = step.error().fault == Fault::kStartBlocked;
     result.fault = step.error().fault;

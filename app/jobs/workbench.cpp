@@ -7,11 +7,11 @@
 
 namespace firstlook {
 namespace {
-constexpr double kFieldMax_m = 0.6;        // farther is as good as free: the largest body radius and clearance are below
-constexpr double kZoneMargin_m = 0.10;     // stopping distance and a voxel, as the reach zone wants
+constexpr double kFieldMax_m = 0.6;     // farther is as good as free: the largest body radius and clearance are below
+constexpr double kZoneMargin_m = 0.10;  // stopping distance and a voxel, as the reach zone wants
 constexpr std::size_t kViewRecordsMax = 512;
-constexpr double kRoomToSpare_m = 0.015;   // beyond rule 5 when there is a choice: surfaces flicker by parts of a voxel
-constexpr double kSlowSpeed_m_s = 0.05;    // stops within 1.3 mm instead of 16.5
+constexpr double kRoomToSpare_m = 0.015;  // beyond rule 5 when there is a choice: surfaces flicker by parts of a voxel
+constexpr double kSlowSpeed_m_s = 0.05;   // stops within 1.3 mm instead of 16.5
 
 DepthSensor sensor_of(const Config& config, const hal::DepthCamera& camera) {
   return {camera.intrinsics(), config.depth.range_min_m, config.depth.range_max_m, config.depth.range_trusted_m,
@@ -47,8 +47,7 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
                    static_cast<double>(needed) / memory::kMiB,
                    static_cast<double>(memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) / memory::kMiB);
   }
-  auto bench =
-      std::unique_ptr<Workbench>(new Workbench(config, facts, *arm, color, depth, workers, geometry));
+  auto bench = std::unique_ptr<Workbench>(new Workbench(config, facts, *arm, color, depth, workers, geometry));
   if (const Status taken = bench->take_memory(); !taken) return std::unexpected(taken.error());
   return bench;
 }
@@ -101,15 +100,15 @@ Status Workbench::take_memory() {
            std::pair{memory::Pool::kDistanceField,
                      2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
-           std::pair{memory::Pool::kViewCandidates,
-                     ViewChooser::required_bytes(g, config_.explore.candidates, 2, config_.explore.certificate_samples)},
+           std::pair{memory::Pool::kViewCandidates, ViewChooser::required_bytes(g, config_.explore.candidates, 2,
+                                                                                config_.explore.certificate_samples)},
        }) {
     if (const Status status = account(pool, bytes); !status) return status;
   }
-  const auto color_pixels = static_cast<std::size_t>(color_.intrinsics().width) *
-                            static_cast<std::size_t>(color_.intrinsics().height);
-  const auto depth_pixels = static_cast<std::size_t>(depth_.intrinsics().width) *
-                            static_cast<std::size_t>(depth_.intrinsics().height);
+  const auto color_pixels =
+      static_cast<std::size_t>(color_.intrinsics().width) * static_cast<std::size_t>(color_.intrinsics().height);
+  const auto depth_pixels =
+      static_cast<std::size_t>(depth_.intrinsics().width) * static_cast<std::size_t>(depth_.intrinsics().height);
   auto gray = memory::PoolBuffer<std::uint8_t>::make(memory::Pool::kColorFrames, color_pixels);
   if (!gray) return std::unexpected(gray.error());
   gray_ = std::move(*gray);
@@ -171,9 +170,15 @@ VoxelCounts Workbench::zone_counts() const {
   for (std::size_t i = 0; i < zone_.size(); ++i) {
     if (zone_[i] == 0) continue;
     switch (map_.voxel_class(i)) {
-      case VoxelClass::kUnknown: ++counts.unknown; break;
-      case VoxelClass::kFree: ++counts.free; break;
-      case VoxelClass::kOccupied: ++counts.occupied; break;
+      case VoxelClass::kUnknown:
+        ++counts.unknown;
+        break;
+      case VoxelClass::kFree:
+        ++counts.free;
+        break;
+      case VoxelClass::kOccupied:
+        ++counts.occupied;
+        break;
     }
   }
   return counts;
@@ -212,7 +217,8 @@ void Workbench::revoke_zone() {
 }
 
 ViewContext Workbench::context(const Clearance& clearance) const {
-  return {arm_, camera_body_, mapping_space_, clearance, map_, zone_, hand_eye_->flange_T_camera * facts_.camera_T_depth};
+  return {
+      arm_, camera_body_, mapping_space_, clearance, map_, zone_, hand_eye_->flange_T_camera * facts_.camera_T_depth};
 }
 
 }  // namespace firstlook

@@ -1,5 +1,5 @@
-/// What the jobs work with: the arm, the observations of the board, the calibration, the map. Jobs of the map strand run
-/// one after the other, so nothing here is locked; what the loop thread needs is published (published_space.hpp).
+/// What the jobs work with: the arm, the observations of the board, the calibration, the map. Jobs of the map strand
+/// run one after the other, so nothing here is locked; what the loop thread needs is published (published_space.hpp).
 #pragma once
 
 #include <memory>
@@ -94,11 +94,11 @@ class Workbench {
 
   [[nodiscard]] const Body& body_of(MotionPhase phase) const;
   [[nodiscard]] FreeSpace space_of(MotionPhase phase) const;
-  /// How a mapping motion is asked for: first with room to spare, so that voxels that flicker do not block it; then with
-  /// the clearance of safety rule 5; then slowly, which needs less room to stop.
+  /// How a mapping motion is asked for: first with room to spare, so that voxels that flicker do not block it; then
+  /// with the clearance of safety rule 5; then slowly, which needs less room to stop.
   struct Pace {
-    Clearance plan;       ///< to choose and plan with
-    Clearance in_force;   ///< that the path must keep while it is driven
+    Clearance plan;      ///< to choose and plan with
+    Clearance in_force;  ///< that the path must keep while it is driven
     SpeedLimits limits;
   };
   [[nodiscard]] std::array<Pace, 3> mapping_paces() const;
@@ -135,22 +135,22 @@ class Workbench {
   Planner planner_;
   Body envelope_body_;
   Body camera_body_;
-  ClearanceTerms blind_terms_;                    ///< before the calibration: no measurement is involved
+  ClearanceTerms blind_terms_;  ///< before the calibration: no measurement is involved
   std::optional<ClearanceTerms> mapping_terms_;
-  ClearanceTerms slow_terms_;                     ///< mapping at kSlowSpeed: less room to stop
-  Clearance clearance_in_force_;                  ///< what the path under way was certified with
+  ClearanceTerms slow_terms_;     ///< mapping at kSlowSpeed: less room to stop
+  Clearance clearance_in_force_;  ///< what the path under way was certified with
 
   memory::PoolBuffer<std::uint8_t> gray_;
   memory::PoolBuffer<std::uint16_t> depth_pixels_;
   memory::PoolBuffer<float> self_depth_;
-  memory::PoolBuffer<std::uint8_t> pictures_;     ///< one for each observation
+  memory::PoolBuffer<std::uint8_t> pictures_;  ///< one for each observation
   std::vector<memory::PoolShare> shares_;
 
   std::optional<BoardPose> identify_reference_;
   std::vector<Observation> observations_;
   Turns bootstrap_;
   std::size_t bootstrap_next_ = 0;
-  std::size_t bootstrap_centers_ = 0;             ///< views around which bootstrap views were made
+  std::size_t bootstrap_centers_ = 0;  ///< views around which bootstrap views were made
   std::optional<HandEyeResult> hand_eye_;
 
   VoxelMap map_;
@@ -160,7 +160,7 @@ class Workbench {
   std::vector<std::uint8_t> zone_;
   DistanceField revoked_field_;  ///< of the safe zone's voxels that a hit took away
   bool any_revoked_ = false;
-  FreeSpace mapping_space_;      ///< as rebuilt last
+  FreeSpace mapping_space_;  ///< as rebuilt last
   ViewChooser chooser_;
   std::optional<SweepProgress> sweep_;
   PublishedSpace published_;

@@ -49,7 +49,7 @@ enum class MotionPhase : std::uint8_t {
   kMapping,            ///< calibrated camera, known free space of the map
 };
 
-struct NoArguments {  ///< kSolve, kValidate, kSummarize
+struct NoArguments {      ///< kSolve, kValidate, kSummarize
   std::uint8_t none = 0;  // a value takes at least one byte
   template <typename Archive>
   void fields(Archive& a) {
@@ -124,9 +124,9 @@ struct DetectArguments {  ///< kDetectBoard: detect in each frame, average, reme
 struct DetectResult {
   bool found = false;
   double rms_px = 0;
-  std::array<double, 3> camera_p_board_m{};        ///< origin of the board in the camera
-  std::array<double, 4> camera_q_board_xyzw{};     ///< rotation of the board in the camera
-  bool changed = false;  ///< against the first view of kIdentify: the image moved with the joint
+  std::array<double, 3> camera_p_board_m{};     ///< origin of the board in the camera
+  std::array<double, 4> camera_q_board_xyzw{};  ///< rotation of the board in the camera
+  bool changed = false;                         ///< against the first view of kIdentify: the image moved with the joint
   template <typename Archive>
   void fields(Archive& a) {
     a(found, rms_px, camera_p_board_m, camera_q_board_xyzw, changed);
@@ -137,7 +137,7 @@ struct CalibrationViewResult {
   bool found = false;  ///< false: no reachable view helps
   bool target_met = false;
   Route path;
-  double sigma_mm = 0;    ///< predicted standard deviation after the views taken so far (norm over axes)
+  double sigma_mm = 0;  ///< predicted standard deviation after the views taken so far (norm over axes)
   double sigma_mrad = 0;
   template <typename Archive>
   void fields(Archive& a) {
@@ -175,7 +175,7 @@ struct IntegrateArguments {
   double now_s = 0;
   bool at_view = false;  ///< the look at a stop, not a frame on the way
   JointVector arm_rad;   ///< where the arm is now
-  Route ahead;            ///< the legs that still lie ahead: they are certified again on the new map
+  Route ahead;           ///< the legs that still lie ahead: they are certified again on the new map
   template <typename Archive>
   void fields(Archive& a) {
     a(frame, now_s, at_view, arm_rad, ahead);
@@ -184,7 +184,7 @@ struct IntegrateArguments {
 
 struct IntegrateResult {
   bool used = false;
-  bool path_free = true;  ///< the legs ahead are still certified
+  bool path_free = true;                              ///< the legs ahead are still certified
   std::uint64_t unknown = 0, free = 0, occupied = 0;  ///< voxels of the mapped zone
   std::uint64_t gained = 0;                           ///< unknown voxels of the zone that this frame made known
   bool at_view = false;                               ///< as asked

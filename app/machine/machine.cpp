@@ -5,10 +5,10 @@
 
 namespace firstlook {
 namespace {
-constexpr double kArrivedWithin_rad = 2e-3;      // of the target, at standstill: 20 times the encoders' resolution
+constexpr double kArrivedWithin_rad = 2e-3;  // of the target, at standstill: 20 times the encoders' resolution
 constexpr double kSupervisePeriod_s = 0.05;
-constexpr double kArmStale_s = 0.1;              // 12 reports at 125 Hz
-constexpr double kDepthStale_s = 0.5;            // 15 frames at 30 Hz
+constexpr double kArmStale_s = 0.1;               // 12 reports at 125 Hz
+constexpr double kDepthStale_s = 0.5;             // 15 frames at 30 Hz
 constexpr double kSegmentAcceptedWithin_s = 0.2;  // else the leg counts as interrupted
 constexpr std::uint32_t kInterruptionsMax = 25;   // of one job; more means that the cell does not stand still
 }  // namespace
@@ -303,8 +303,8 @@ bool Machine::advance_look(const MachineEvent& event) {
 
 void Machine::integrate(const PosedFrame& frame, bool at_view) {
   const std::uint32_t awaited = awaited_;
-  integrate_job_ =
-      start_job(JobKind::kIntegrate, IntegrateArguments{frame, now_.seconds(), at_view, arm_.position_rad, legs_ahead()});
+  integrate_job_ = start_job(JobKind::kIntegrate,
+                             IntegrateArguments{frame, now_.seconds(), at_view, arm_.position_rad, legs_ahead()});
   awaited_ = awaited;
 }
 

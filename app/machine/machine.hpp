@@ -1,5 +1,5 @@
-/// The hierarchical state machine of the job. Every decision is a function of the settings and the events, nothing else:
-/// no clock, no device, no map. Allocates nothing.
+/// The hierarchical state machine of the job. Every decision is a function of the settings and the events, nothing
+/// else: no clock, no device, no map. Allocates nothing.
 #pragma once
 
 #include <cstdint>
@@ -34,12 +34,12 @@ struct MachineSettings {
 
 /// What the machine remembers of the job, apart from the state itself.
 struct Progress {
-  ViewList views;              ///< of LocateBoard, later of IdentifyLink
-  std::uint32_t view = 0;      ///< position in `views`
-  std::uint32_t observations = 0;   ///< views of the board taken for the calibration
-  std::uint32_t failed_looks = 0;   ///< in a row, at calibration views
-  std::uint32_t still_images = 0;   ///< joints that moved without moving the image
-  std::uint32_t steps = 0;          ///< of the current state: seeds its candidates
+  ViewList views;                  ///< of LocateBoard, later of IdentifyLink
+  std::uint32_t view = 0;          ///< position in `views`
+  std::uint32_t observations = 0;  ///< views of the board taken for the calibration
+  std::uint32_t failed_looks = 0;  ///< in a row, at calibration views
+  std::uint32_t still_images = 0;  ///< joints that moved without moving the image
+  std::uint32_t steps = 0;         ///< of the current state: seeds its candidates
   std::uint32_t sweep_views = 0;
   std::uint32_t explore_views = 0;
   std::uint32_t replans = 0;        ///< in a row, without a view between

@@ -50,9 +50,9 @@ struct StateRow {
   StateId state;
   StateId parent;
   std::string_view name;
-  void (*enter)(Machine&);                               ///< may be null
-  void (*exit)(Machine&);                                ///< may be null
-  Handled (*on_event)(Machine&, const MachineEvent&);    ///< may be null; kNo passes the event to the parent
+  void (*enter)(Machine&);                             ///< may be null
+  void (*exit)(Machine&);                              ///< may be null
+  Handled (*on_event)(Machine&, const MachineEvent&);  ///< may be null; kNo passes the event to the parent
   std::span<const Transition> transitions;
 };
 

@@ -12,8 +12,8 @@ namespace {
 std::string pose_row(const std::string& image, const Transform<Base, Flange>& pose) {
   const Eigen::Vector3d t = pose.translation();
   const Eigen::Quaterniond q = pose.quaternion();
-  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}\n", image, t.x(), t.y(), t.z(), q.x(), q.y(),
-                     q.z(), q.w());
+  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}\n", image, t.x(), t.y(), t.z(), q.x(),
+                     q.y(), q.z(), q.w());
 }
 
 }  // namespace

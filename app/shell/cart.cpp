@@ -36,8 +36,8 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   auto bench = Workbench::make(cart->config_, facts, devices.color, devices.depth, *cart->workers_);
   if (!bench) return std::unexpected(bench.error());
   cart->bench_ = std::move(*bench);
-  auto journal = JournalWriter::create_file(options.journal_path,
-                                            {version_text(), journal_config(cart->config_, options.scope)});
+  auto journal =
+      JournalWriter::create_file(options.journal_path, {version_text(), journal_config(cart->config_, options.scope)});
   if (!journal) return std::unexpected(journal.error());
   cart->journal_ = std::move(*journal);
   cart->jobs_ = std::make_unique<CartJobs>(*cart->bench_);
@@ -45,7 +45,7 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
                                               options.real_time ? JobMode::kThreaded : JobMode::kVirtual);
   cart->loop_.reset(new EventLoop(*cart->clock_, cart->journal_.get(), *cart, cart->timers_, *cart->runner_));
   cart->arm_source_.emplace(devices.arm, cart->bench_->arm(), cart->bench_->published());
-  EventSource* const sources[] = {&cart->host_,         &*cart->arm_source_,      &cart->color_source_,
+  EventSource* const sources[] = {&cart->host_,         &*cart->arm_source_,    &cart->color_source_,
                                   &cart->depth_source_, &cart->pendant_source_, &cart->panel_source_};
   for (EventSource* source : sources) cart->loop_->add_source(*source);
   cart->loop_->set_watchdog(&cart->watchdog_);
@@ -153,9 +153,7 @@ void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<
   ENSURE(7221, runner_->submit(request_, now).has_value());
 }
 
-void Cart::set_timer(Instant, MachineTimer timer, Instant due) {
-  timers_.set(static_cast<std::uint32_t>(timer), due);
-}
+void Cart::set_timer(Instant, MachineTimer timer, Instant due) { timers_.set(static_cast<std::uint32_t>(timer), due); }
 
 void Cart::cancel_timer(Instant, MachineTimer timer) { timers_.cancel(static_cast<std::uint32_t>(timer)); }
 

@@ -29,13 +29,20 @@ std::optional<MachineEvent> decode_event(std::uint16_t kind, std::span<const std
       if (!reader.ok()) return std::nullopt;
       return JobCompleted{static_cast<JobKind>(job), number, bytes.subspan(kJobHeadBytes)};
     }
-    case ArmReported::kKind: return as<ArmReported>(bytes);
-    case ColorFrameArrived::kKind: return as<ColorFrameArrived>(bytes);
-    case DepthFrameArrived::kKind: return as<DepthFrameArrived>(bytes);
-    case OperatorActed::kKind: return as<OperatorActed>(bytes);
-    case CommandRefused::kKind: return as<CommandRefused>(bytes);
-    case ShutdownAsked::kKind: return as<ShutdownAsked>(bytes);
-    default: return std::nullopt;
+    case ArmReported::kKind:
+      return as<ArmReported>(bytes);
+    case ColorFrameArrived::kKind:
+      return as<ColorFrameArrived>(bytes);
+    case DepthFrameArrived::kKind:
+      return as<DepthFrameArrived>(bytes);
+    case OperatorActed::kKind:
+      return as<OperatorActed>(bytes);
+    case CommandRefused::kKind:
+      return as<CommandRefused>(bytes);
+    case ShutdownAsked::kKind:
+      return as<ShutdownAsked>(bytes);
+    default:
+      return std::nullopt;
   }
 }
 

@@ -7,11 +7,10 @@
 namespace firstlook {
 namespace {
 constexpr std::string_view kScopeLine = "# only: ";
-constexpr std::array<std::pair<RunScope, std::string_view>, 4> kScopes = {
-    {{RunScope::kEverything, "everything"},
-     {RunScope::kCalibrate, "calibrate"},
-     {RunScope::kMap, "map"},
-     {RunScope::kVerify, "verify"}}};
+constexpr std::array<std::pair<RunScope, std::string_view>, 4> kScopes = {{{RunScope::kEverything, "everything"},
+                                                                           {RunScope::kCalibrate, "calibrate"},
+                                                                           {RunScope::kMap, "map"},
+                                                                           {RunScope::kVerify, "verify"}}};
 }  // namespace
 
 std::string_view name_of(RunScope scope) { return kScopes[static_cast<std::size_t>(scope)].second; }

@@ -31,9 +31,10 @@ class Comparison final : public DecisionLog {
     const bool same = record.kind == static_cast<std::uint16_t>(kind) && record.time == now &&
                       std::equal(bytes.begin(), bytes.end(), record.payload.begin(), record.payload.end());
     if (!same) {
-      difference_ = failure(Fault::kReplayDiffers,
-                            "decision {} (record {}) at {:.3f} s: kind {} was recorded, kind {} of {} bytes decided now",
-                            at, record.number, record.time.seconds(), record.kind, static_cast<int>(kind), bytes.size());
+      difference_ =
+          failure(Fault::kReplayDiffers,
+                  "decision {} (record {}) at {:.3f} s: kind {} was recorded, kind {} of {} bytes decided now", at,
+                  record.number, record.time.seconds(), record.kind, static_cast<int>(kind), bytes.size());
     }
   }
 

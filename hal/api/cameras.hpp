@@ -54,7 +54,8 @@ class ColorCamera : public FrameStream {
 class DepthCamera : public FrameStream {
  public:
   [[nodiscard]] virtual double units_per_m() const = 0;
-  /// Copies the frame's depth into `image` (0: no return), which has the size of intrinsics(). May be called on a job's thread.
+  /// Copies the frame's depth into `image` (0: no return), which has the size of intrinsics(). May be called on a job's
+  /// thread.
   [[nodiscard]] virtual Status read(const Frame& frame, ImageView<std::uint16_t> image) = 0;
 };
 

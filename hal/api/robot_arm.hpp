@@ -25,13 +25,13 @@ struct ArmState {
   std::uint32_t segment = 0;     ///< number of the last segment that was accepted; 0 before the first
 };
 
-/// One joint-linear move without blend, as URScript's movej: all joints start and end together, trapezoidal speed of the
-/// joint with the longest way.
+/// One joint-linear move without blend, as URScript's movej: all joints start and end together, trapezoidal speed of
+/// the joint with the longest way.
 struct Segment {
   std::uint32_t number = 0;  ///< counts up from 1; reported back in ArmState::segment
   JointVector target_rad;
-  double speed_rad_s = 0;           ///< of the leading joint
-  double acceleration_rad_s2 = 0;   ///< of the leading joint
+  double speed_rad_s = 0;          ///< of the leading joint
+  double acceleration_rad_s2 = 0;  ///< of the leading joint
 };
 
 struct ArmCounters {

@@ -24,8 +24,8 @@ class KnownFreeView {
   [[nodiscard]] virtual const GridGeometry& geometry() const = 0;
   /// True where the body may be at this moment: known free, or intact safe zone.
   [[nodiscard]] virtual bool free_for_motion(std::size_t voxel) const = 0;
-  /// True where a hit has taken a voxel out of the safe zone. Elsewhere what lies inside the zone's cylinder is free, also
-  /// where the cylinder cuts through a voxel.
+  /// True where a hit has taken a voxel out of the safe zone. Elsewhere what lies inside the zone's cylinder is free,
+  /// also where the cylinder cuts through a voxel.
   [[nodiscard]] virtual bool zone_revoked(std::size_t /*voxel*/) const { return true; }
 };
 

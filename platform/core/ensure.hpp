@@ -3,7 +3,8 @@
 
 namespace firstlook {
 
-/// What runs before the process ends after a failed ENSURE: stop the arm, close the journal. Must not allocate or throw.
+/// What runs before the process ends after a failed ENSURE: stop the arm, close the journal. Must not allocate or
+/// throw.
 using EnsureHook = void (*)();
 void set_ensure_hook(EnsureHook hook);
 
@@ -13,7 +14,7 @@ void set_ensure_hook(EnsureHook hook);
 }  // namespace firstlook
 
 /// Ends the process safely when a condition that the program guarantees does not hold. Numbers are unique in the tree.
-#define ENSURE(number, condition)                                                              \
-  do {                                                                                         \
-    if (!(condition)) ::firstlook::ensure_failed((number), #condition, __FILE__, __LINE__);    \
+#define ENSURE(number, condition)                                                           \
+  do {                                                                                      \
+    if (!(condition)) ::firstlook::ensure_failed((number), #condition, __FILE__, __LINE__); \
   } while (false)

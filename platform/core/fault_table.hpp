@@ -57,7 +57,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
 // clang-format on
 
 enum class Fault : std::uint16_t {
-#define FIRSTLOOK_FAULT_ENUM(name, code, severity, text, remedy) name = code,
+#define FIRSTLOOK_FAULT_ENUM(name, code, severity, text, remedy) name = (code),
   FIRSTLOOK_FAULTS(FIRSTLOOK_FAULT_ENUM)
 #undef FIRSTLOOK_FAULT_ENUM
 };

@@ -21,13 +21,13 @@ class Random {
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0);
 
   [[nodiscard]] std::uint64_t bits();
-  [[nodiscard]] double uniform();                        ///< [0, 1)
+  [[nodiscard]] double uniform();                         ///< [0, 1)
   [[nodiscard]] double uniform(double low, double high);  ///< [low, high)
-  [[nodiscard]] int below(int n);                        ///< 0 .. n-1, n >= 1
-  [[nodiscard]] double normal();                         ///< mean 0, standard deviation 1 (Box and Muller 1958)
+  [[nodiscard]] int below(int n);                         ///< 0 .. n-1, n >= 1
+  [[nodiscard]] double normal();                          ///< mean 0, standard deviation 1 (Box and Muller 1958)
   [[nodiscard]] Eigen::Vector3d normal3();
-  [[nodiscard]] Eigen::Vector3d direction();             ///< uniform on the unit sphere
-  [[nodiscard]] Eigen::Quaterniond rotation();           ///< uniform on SO(3) (Shoemake 1992)
+  [[nodiscard]] Eigen::Vector3d direction();    ///< uniform on the unit sphere
+  [[nodiscard]] Eigen::Quaterniond rotation();  ///< uniform on SO(3) (Shoemake 1992)
 
  private:
   std::uint64_t state_[4];

@@ -78,7 +78,8 @@ class ScriptedWorld : public DecisionSink {
   void press(hal::OperatorAction action, OperatorDevice device = OperatorDevice::kPendant) {
     machine.on_event(now, OperatorActed{device, action});
   }
-  /// Steps of 8 ms until the state is entered, the job ends, or the time is over. Returns whether the state was reached.
+  /// Steps of 8 ms until the state is entered, the job ends, or the time is over. Returns whether the state was
+  /// reached.
   bool run_until(StateId state, double limit_s = 600) {
     if (visited.empty()) machine.start(now);
     const Instant end = now + seconds(limit_s);
@@ -190,16 +191,24 @@ class ScriptedWorld : public DecisionSink {
       const Job job = jobs_.front();
       jobs_.pop_front();
       switch (job.kind) {
-        case JobKind::kLocateViews: answer(job, views_around(position_, locate_views)); break;
-        case JobKind::kIdentifyMotions: answer(job, views_around(position_, 6)); break;
-        case JobKind::kPlan: answer(job, plan(arguments_of<PlanArguments>(job))); break;
+        case JobKind::kLocateViews:
+          answer(job, views_around(position_, locate_views));
+          break;
+        case JobKind::kIdentifyMotions:
+          answer(job, views_around(position_, 6));
+          break;
+        case JobKind::kPlan:
+          answer(job, plan(arguments_of<PlanArguments>(job)));
+          break;
         case JobKind::kCertifyPath: {
           PlanResult r;
           r.found = true;
           answer(job, r);
           break;
         }
-        case JobKind::kDetectBoard: answer(job, detect(arguments_of<DetectArguments>(job))); break;
+        case JobKind::kDetectBoard:
+          answer(job, detect(arguments_of<DetectArguments>(job)));
+          break;
         case JobKind::kNextCalibrationView: {
           CalibrationViewResult r;
           r.found = true;
@@ -209,8 +218,12 @@ class ScriptedWorld : public DecisionSink {
           answer(job, r);
           break;
         }
-        case JobKind::kSolve: answer(job, solve); break;
-        case JobKind::kValidate: answer(job, validate); break;
+        case JobKind::kSolve:
+          answer(job, solve);
+          break;
+        case JobKind::kValidate:
+          answer(job, validate);
+          break;
         case JobKind::kIntegrate: {
           IntegrateResult r = integrated;
           r.at_view = arguments_of<IntegrateArguments>(job).at_view;
@@ -218,9 +231,15 @@ class ScriptedWorld : public DecisionSink {
           break;
         }
         case JobKind::kNextSweepView:
-        case JobKind::kNextView: answer(job, next_view(arguments_of<FromHere>(job))); break;
-        case JobKind::kCheckBoard: answer(job, check); break;
-        case JobKind::kSummarize: answer(job, SummarizeResult{}); break;
+        case JobKind::kNextView:
+          answer(job, next_view(arguments_of<FromHere>(job)));
+          break;
+        case JobKind::kCheckBoard:
+          answer(job, check);
+          break;
+        case JobKind::kSummarize:
+          answer(job, SummarizeResult{});
+          break;
       }
     }
   }

@@ -12,7 +12,7 @@ bool stored_calibration(Machine& m) {
 void next_view(Machine& m) {
   Progress& p = m.progress();
   const auto enough = static_cast<std::uint32_t>(stored_calibration(m) ? m.settings().verify_views
-                                                                        : m.settings().calibration_views_max);
+                                                                       : m.settings().calibration_views_max);
   if (p.observations >= enough) {
     m.transition(stored_calibration(m) ? StateId::kValidate : StateId::kSolve);
     return;
@@ -57,9 +57,14 @@ Handled on_collect(Machine& m, const MachineEvent& event) {
     next_view(m);
   }
   switch (m.advance_trip(event)) {
-    case Machine::Trip::kArrived: m.start_look(false, m.settings().frames_per_view); break;
-    case Machine::Trip::kInterrupted: next_view(m); break;
-    default: break;
+    case Machine::Trip::kArrived:
+      m.start_look(false, m.settings().frames_per_view);
+      break;
+    case Machine::Trip::kInterrupted:
+      next_view(m);
+      break;
+    default:
+      break;
   }
   return Handled::kNo;
 }

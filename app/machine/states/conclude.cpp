@@ -25,9 +25,14 @@ Handled on_verify_board(Machine& m, const MachineEvent& event) {
     }
   }
   switch (m.advance_trip(event)) {
-    case Machine::Trip::kArrived: m.start_look(false, m.settings().frames_per_view); break;
-    case Machine::Trip::kInterrupted: enter_verify_board(m); break;
-    default: break;
+    case Machine::Trip::kArrived:
+      m.start_look(false, m.settings().frames_per_view);
+      break;
+    case Machine::Trip::kInterrupted:
+      enter_verify_board(m);
+      break;
+    default:
+      break;
   }
   return Handled::kNo;
 }
@@ -47,9 +52,14 @@ Handled on_park(Machine& m, const MachineEvent& event) {
     }
   }
   switch (m.advance_trip(event)) {
-    case Machine::Trip::kArrived: m.transition(StateId::kReport); break;
-    case Machine::Trip::kInterrupted: enter_park(m); break;
-    default: break;
+    case Machine::Trip::kArrived:
+      m.transition(StateId::kReport);
+      break;
+    case Machine::Trip::kInterrupted:
+      enter_park(m);
+      break;
+    default:
+      break;
   }
   return Handled::kNo;
 }

@@ -69,7 +69,8 @@ Handled on_move(Machine& m, const MachineEvent& event) {
       ++m.progress().replans;
       m.transition(StateId::kLook);
       break;
-    default: break;
+    default:
+      break;
   }
   return Handled::kNo;
 }

@@ -64,9 +64,14 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
     }
   }
   switch (m.advance_trip(event)) {
-    case Machine::Trip::kArrived: m.start_look(false, 1); break;
-    case Machine::Trip::kInterrupted: next_motion(m); break;
-    default: break;
+    case Machine::Trip::kArrived:
+      m.start_look(false, 1);
+      break;
+    case Machine::Trip::kInterrupted:
+      next_motion(m);
+      break;
+    default:
+      break;
   }
   return Handled::kNo;
 }

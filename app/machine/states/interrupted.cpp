@@ -3,8 +3,8 @@
 
 namespace firstlook::states {
 namespace {
-constexpr double kLongPause_s = 60;    // then what was known free must be seen again (safety rule 7)
-constexpr double kPauseMax_s = 3600;   // then the job ends
+constexpr double kLongPause_s = 60;   // then what was known free must be seen again (safety rule 7)
+constexpr double kPauseMax_s = 3600;  // then the job ends
 
 /// Within Explore every pause leads back to choosing: the way is planned from where the arm is then.
 StateId resume_state(StateId paused) { return is_within(paused, StateId::kExplore) ? StateId::kChoose : paused; }

@@ -58,9 +58,14 @@ Handled on_locate_board(Machine& m, const MachineEvent& event) {
     }
   }
   switch (m.advance_trip(event)) {
-    case Machine::Trip::kArrived: m.start_look(false, 1); break;
-    case Machine::Trip::kInterrupted: go_to_view(m); break;
-    default: break;
+    case Machine::Trip::kArrived:
+      m.start_look(false, 1);
+      break;
+    case Machine::Trip::kInterrupted:
+      go_to_view(m);
+      break;
+    default:
+      break;
   }
   return Handled::kNo;
 }

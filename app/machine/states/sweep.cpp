@@ -25,8 +25,8 @@ void take(Machine& m, const NextViewResult& choice) {
 
 }  // namespace
 
-/// Before the first look the arm goes back to where it started, still by the rules of the safe zone: where the last view
-/// of the board left it, the camera that is now known may be too near to the arm itself.
+/// Before the first look the arm goes back to where it started, still by the rules of the safe zone: where the last
+/// view of the board left it, the camera that is now known may be too near to the arm itself.
 void enter_sweep(Machine& m) {
   if (m.progress().sweep_views == 0) {
     plan_to(m, m.settings().parking_rad, MotionPhase::kBeforeCalibration);
@@ -42,8 +42,11 @@ Handled on_sweep(Machine& m, const MachineEvent& event) {
       p.replans = 0;
       m.start_look(true, 1);
       return Handled::kNo;
-    case Machine::Trip::kInterrupted: m.start_look(true, 1); return Handled::kNo;
-    default: break;
+    case Machine::Trip::kInterrupted:
+      m.start_look(true, 1);
+      return Handled::kNo;
+    default:
+      break;
   }
   if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {

@@ -6,8 +6,8 @@
 #include "tests/support/scripted_world.hpp"
 
 namespace firstlook {
-using test::ScriptedWorld;
 using hal::OperatorAction;
+using test::ScriptedWorld;
 
 TEST_CASE("nothing moves before Play, and Play runs the whole job", "[machine]") {
   ScriptedWorld world;
