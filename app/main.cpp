@@ -93,8 +93,23 @@ TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
   claims.observable.sensor_range_trusted_m = config.depth.range_trusted_m;
   claims.observable.zone_floor_m = config.map.low_m[2];
   const sim::TruthFigures figures = grader.grade(claims);
-  return {figures.hand_eye_error_mm, figures.hand_eye_error_mrad,    figures.hand_eye_mahalanobis2, figures.contacts,
-          figures.unknown_entries,   figures.coverage_of_observable, figures.false_free_voxels};
+  TruthRecord truth;
+  truth.hand_eye_error_mm = figures.hand_eye_error_mm;
+  truth.hand_eye_error_mrad = figures.hand_eye_error_mrad;
+  truth.hand_eye_mahalanobis2 = figures.hand_eye_mahalanobis2;
+  truth.contacts = figures.contacts;
+  truth.unknown_entries = figures.unknown_entries;
+  truth.coverage_of_observable = figures.coverage_of_observable;
+  truth.false_free_voxels = figures.false_free_voxels;
+  if (claims.map == nullptr) return truth;
+  const VoxelMap swept = bench.map_after_sweep();
+  claims.map = &swept;
+  const auto after_sweep = grader.regions(claims);
+  for (std::size_t i = 0; i < figures.regions.size() && i < after_sweep.size(); ++i) {
+    const sim::RegionFigure& region = figures.regions[i];
+    truth.regions.push_back({region.name, region.observable, after_sweep[i].known_fraction, region.known_fraction});
+  }
+  return truth;
 }
 
 void narrate_result(const RunRecord& record, const std::string& folder, Narrator& narrator) {

@@ -79,6 +79,12 @@ SummarizeResult Workbench::summarize() {
   return result;
 }
 
+VoxelMap Workbench::map_after_sweep() const {
+  VoxelMap swept(map_.geometry(), VoxelMap::Planes::kLogOddsOnly);
+  for (std::size_t i = 0; i < swept_log_odds_.size(); ++i) swept.set(i, classify(swept_log_odds_[i]), 0);
+  return swept;
+}
+
 std::vector<Eigen::Vector3d> Workbench::view_positions() const {
   std::vector<Eigen::Vector3d> positions;
   if (!hand_eye_) return positions;
@@ -107,7 +113,10 @@ std::vector<RgbPicture> Workbench::map_pictures() const {
     draw("the map with the views in order, seen from " + std::string(azimuth < 0 ? "behind" : "the front"), 800, 600,
          [&](RgbImage image) { draw_map(map_, viewpoint, {}, positions, image); });
   }
-  draw("what remains unknown in the reach of the arm (veil)", 800, 600,
+  const VoxelMap swept = map_after_sweep();
+  draw("after the sweep: what was still unknown in the reach of the arm (veil)", 800, 600,
+       [&](RgbImage image) { draw_map(swept, {}, zone_, {}, image); });
+  draw("at the end: what remains unknown in the reach of the arm (veil)", 800, 600,
        [&](RgbImage image) { draw_map(map_, {}, zone_, {}, image); });
   for (const double z : {0.0, 0.25, 0.5}) {
     draw(fmt::format("layer at {:.2f} m: occupied dark, free light, unknown grey", z), 420, 420,

@@ -1,4 +1,6 @@
 /// Jobs that plan motion: certified paths, the sweep, the next best view.
+#include <algorithm>
+
 #include "app/jobs/workbench.hpp"
 
 namespace firstlook {
@@ -103,6 +105,7 @@ NextViewResult Workbench::next_sweep_view(const FromHere& here) {
     if (!result.blocked) break;
   }
   sweeping_ = result.found || result.blocked;
+  if (!sweeping_) std::copy(map_.log_odds().begin(), map_.log_odds().end(), swept_log_odds_.begin());
   return result;
 }
 

@@ -40,7 +40,7 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
   const GridGeometry geometry =
       GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
-  const std::size_t needed = VoxelMap::required_bytes(geometry) + 2 * geometry.count();
+  const std::size_t needed = VoxelMap::required_bytes(geometry) + 3 * geometry.count();
   if (needed > memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) {
     return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m need {:.1f} MiB, the budget holds {:.1f} MiB",
                    geometry.size.x(), geometry.size.y(), geometry.size.z(), geometry.resolution_m,
@@ -74,6 +74,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       revoked_field_(geometry, kFieldMax_m),
       chooser_(geometry, sensor_of(config, depth), config.explore.candidates, workers.workers(),
                config.explore.certificate_samples),
+      swept_log_odds_(geometry.count(), kUnknownLogOdds),
       published_(geometry, kFieldMax_m) {
   map_.set_safe_zone(zone_cylinder_);
   for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});
@@ -96,7 +97,7 @@ Status Workbench::take_memory() {
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   for (const auto& [pool, bytes] : {
-           std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 2 * g.count()},
+           std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,
                      2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},

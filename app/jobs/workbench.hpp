@@ -74,6 +74,8 @@ class Workbench {
   [[nodiscard]] const std::vector<MappingViewRecord>& mapping_views() const { return mapping_views_; }
   [[nodiscard]] const std::vector<RemainingRecord>& remaining() const { return remaining_; }
   [[nodiscard]] const VoxelMap& map() const { return map_; }
+  /// The classes of the map as the sweep left it; all unknown when the sweep did not end.
+  [[nodiscard]] VoxelMap map_after_sweep() const;
   [[nodiscard]] std::span<const std::uint8_t> zone() const { return zone_; }
   [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
   [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
@@ -163,6 +165,7 @@ class Workbench {
   FreeSpace mapping_space_;  ///< as rebuilt last
   ViewChooser chooser_;
   std::optional<SweepProgress> sweep_;
+  std::vector<std::int8_t> swept_log_odds_;  ///< when the sweep ended
   PublishedSpace published_;
   double last_stamp_s_ = 0;
   bool sweeping_ = true;

@@ -55,13 +55,21 @@ Json wall_json(const WallRecord& wall) {
 }
 
 Json truth_json(const TruthRecord& truth) {
+  Json regions = Json::array();
+  for (const TruthRecord::Region& region : truth.regions) {
+    regions.push_back({{"name", region.name},
+                       {"observable", region.observable},
+                       {"known_after_sweep", region.known_after_sweep},
+                       {"known", region.known}});
+  }
   return {{"hand_eye_error_mm", or_null(truth.hand_eye_error_mm)},
           {"hand_eye_error_mrad", or_null(truth.hand_eye_error_mrad)},
           {"hand_eye_mahalanobis2", or_null(truth.hand_eye_mahalanobis2)},
           {"contacts", truth.contacts},
           {"unknown_entries", truth.unknown_entries},
           {"coverage_of_observable", or_null(truth.coverage_of_observable)},
-          {"false_free_voxels", or_null(truth.false_free_voxels)}};
+          {"false_free_voxels", or_null(truth.false_free_voxels)},
+          {"regions", regions}};
 }
 
 /// A cell from a file goes by the file's name: paths differ from machine to machine.

@@ -123,6 +123,15 @@ struct TruthRecord {
   std::uint64_t unknown_entries = 0;
   std::optional<double> coverage_of_observable;  ///< 0..1
   std::optional<std::uint64_t> false_free_voxels;
+  /// A part of the cell that is named in its description, e.g. behind the screens: share of its observable voxels
+  /// known.
+  struct Region {
+    std::string name;
+    std::uint64_t observable = 0;
+    double known_after_sweep = 0;  ///< 0..1
+    double known = 0;              ///< 0..1, at the end
+  };
+  std::vector<Region> regions;
 };
 
 /// A line of the fault log.

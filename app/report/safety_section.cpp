@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <algorithm>
 
 #include "app/report/html.hpp"
 #include "app/report/sections.hpp"
@@ -78,6 +79,12 @@ std::string truth_section(const RunRecord& record) {
   row("seen of what could be observed", t.coverage_of_observable, " %", 100);
   table.row({"voxels called free that hold something",
              t.false_free_voxels ? grouped(*t.false_free_voxels) : "not determined"});
+  for (const TruthRecord::Region& region : t.regions) {
+    std::string name = region.name;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    table.row({"known of what could be observed " + name + ", after the sweep and at the end",
+               fmt::format("{:.0f} % and {:.0f} %", 100 * region.known_after_sweep, 100 * region.known)});
+  }
   return section(
       "truth", "Graded against the simulated cell",
       "<p>The simulator knows the truth. The job never reads it; it only grades the result.</p>\n" + table.html());
