@@ -1,9 +1,10 @@
 # The verbs of firstlook. Each does all that it needs: packages, build, run.
 SHELL := /bin/sh
 JOBS ?= $(shell nproc)
+export JOBS
 ARGS ?=
 .DEFAULT_GOAL := build
-.PHONY: build run test test-asan bench format tidy deps clean help
+.PHONY: build run test test-asan format tidy deps clean help
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 20
@@ -21,10 +22,6 @@ test: deps ## every test, by ctest
 test-asan: deps ## the same under AddressSanitizer and UndefinedBehaviorSanitizer
 	@toolchain/build asan-ubsan all
 	@ctest --test-dir build/asan-ubsan --output-on-failure -j $(JOBS)
-
-bench: deps ## figures against peers, ONLY=name for one group; writes build/bench.json
-	@toolchain/build release firstlook_bench
-	@build/release/tests/bench/firstlook_bench $(if $(ONLY),--only $(ONLY)) --json build/bench.json
 
 format: ## clang-format everything in place
 	@toolchain/install-dependencies check

@@ -33,10 +33,11 @@ std::string quality_table(const RunRecord& record) {
   const HandEyeResult& h = *record.hand_eye;
   HtmlTable table({"figure", "value", "what it says"}, 3);
   if (!h.from_pairs) {
-    table.row({"reprojection error", fmt::format("{:.3f} px RMS", h.reprojection_rms_px),
-               "how well the views in the solve fit; small is necessary, not sufficient"});
+    table.row(
+        {"reprojection error", fmt::format("{:.3f} px RMS", h.reprojection_rms_px),
+         "how well the views fit once each is granted a deviation of the arm; small is necessary, not sufficient"});
     table.row({"held-out reprojection error", fmt::format("{:.3f} px RMS", h.holdout_rms_px),
-               "in views that took no part in the solve, the arm's own error included"});
+               "in views left out of the solve in turn, the arm's own error included"});
   }
   table.row({"held-out board position", fmt::format("{:.2f} mm RMS", h.holdout_rms_m * 1e3),
              "where the other views put the board against where this one sees it"});
@@ -130,7 +131,9 @@ std::string calibration_views_section(const RunRecord& record) {
   body +=
       "<p class=\"hint\"><span class=\"key detected\">○</span> detected corners, <span class=\"key "
       "reprojected\">+</span> "
-      "corners as the calibration predicts them. Select a picture to enlarge it.</p>\n<div class=\"shots\">\n";
+      "corners as the calibration predicts them from where the arm says it stood. The solve grants each view a small "
+      "deviation of the arm, so these figures are larger than its own reprojection error. Select a picture to enlarge "
+      "it.</p>\n<div class=\"shots\">\n";
   // Fewer pixels for each picture when there are many of them, so that the page stays below some 3 MB.
   const int width_max = views.size() <= 24 ? 320 : 240;
   for (std::size_t i = 0; i < views.size(); ++i) body += view_figure(views[i], i + 1, record.intrinsics, width_max);

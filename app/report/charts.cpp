@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "app/report/html.hpp"
 
@@ -13,6 +14,8 @@ namespace {
 
 // Colours that remain apart with the common kinds of colour blindness (Okabe and Ito 2008).
 constexpr std::string_view kBlue = "#0072b2", kOrange = "#d55e00", kGreen = "#009e73", kGrey = "#6b7280";
+
+constexpr double kPhaseShown_s = 0.05;
 
 /// 1, 2 or 5 times a power of ten: about `count` steps up to `top`.
 double nice_step(double top, int count) {
@@ -207,9 +210,13 @@ std::string residual_chart(std::span<const CalibrationViewRecord> views) {
   return svg + "</svg>\n";
 }
 
-std::string phase_chart(std::span<const PhaseRecord> phases) {
+std::string phase_chart(std::span<const PhaseRecord> all_phases) {
+  // A state that was only passed through is no phase that a reader looks for.
+  std::vector<PhaseRecord> phases;
+  std::copy_if(all_phases.begin(), all_phases.end(), std::back_inserter(phases),
+               [](const PhaseRecord& phase) { return !(phase.end_s - phase.start_s < kPhaseShown_s); });
   if (phases.empty()) return {};
-  double begin = phases.front().start_s, end = phases.front().end_s;
+  double begin = 0, end = 0;  // time counts from the start of the program
   for (const PhaseRecord& phase : phases) {
     begin = std::min(begin, phase.start_s);
     end = std::max(end, phase.end_s);

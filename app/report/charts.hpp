@@ -19,7 +19,7 @@ namespace firstlook {
 /// Every corner's reprojection error (detected - reprojected, px) as a dot, with circles at round distances.
 [[nodiscard]] std::string residual_chart(std::span<const CalibrationViewRecord> views);
 
-/// The phases of the job on a time line.
+/// The phases of the job on a time line, without those that were only passed through. Empty when none is left.
 [[nodiscard]] std::string phase_chart(std::span<const PhaseRecord> phases);
 
 /// The peak of each pool inside what it reserves, and all of them inside the budget.

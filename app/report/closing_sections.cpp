@@ -37,7 +37,7 @@ std::string wall_section(const RunRecord& record) {
   HtmlTable table({"", ""}, 2);
   table.row({"started (UTC)", w.started});
   table.row({"took", duration_text(w.total_s)});
-  table.row({"of that the arm waited for the computer", duration_text(w.stall_s)});
+  table.row({"time of the job in which the arm waited for the computer", duration_text(w.stall_s)});
   table.row({"resident memory", mib_text(w.rss_bytes)});
   table.row({"workers", fmt::format("{}", w.workers)});
   table.row({"folder", w.folder});

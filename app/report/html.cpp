@@ -90,7 +90,10 @@ void HtmlTable::row(const std::vector<std::string>& cells) {
   ++rows_;
 }
 
-std::string HtmlTable::html() const { return "<div class=\"scroll\"><table>" + html_ + "</tbody></table></div>\n"; }
+std::string HtmlTable::html(std::string_view style) const {
+  const std::string open = style.empty() ? "<table>" : fmt::format("<table class=\"{}\">", style);
+  return "<div class=\"scroll\">" + open + html_ + "</tbody></table></div>\n";
+}
 
 std::string grouped(std::uint64_t value) {
   const std::string digits = fmt::format("{}", value);

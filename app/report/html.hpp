@@ -20,7 +20,8 @@ class HtmlTable {
   HtmlTable(std::initializer_list<std::string_view> header, int text_columns);
   void row(const std::vector<std::string>& cells);
   [[nodiscard]] bool empty() const { return rows_ == 0; }
-  [[nodiscard]] std::string html() const;
+  /// @param style  class of the table element; a word of ours, not data
+  [[nodiscard]] std::string html(std::string_view style = {}) const;
 
  private:
   void append_cell(std::string_view tag, int column, std::string_view text);

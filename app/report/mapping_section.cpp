@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "app/report/charts.hpp"
 #include "app/report/html.hpp"
@@ -31,26 +35,48 @@ std::string counts_table(const MappingRecord& m) {
   return table.html();
 }
 
+/// Landscape pictures two abreast, square ones (layers) three abreast below them.
 std::string map_pictures(const std::vector<RgbPicture>& pictures) {
-  std::string html;
+  std::string maps, layers;
   int number = 0;
   for (const RgbPicture& picture : pictures) {
     const std::vector<std::byte> png = encode_png(picture);
     if (png.empty()) continue;
     ++number;
-    html += fmt::format(
+    (picture.width > picture.height ? maps : layers) += fmt::format(
         "<figure class=\"shot\" id=\"map{0}\"><a href=\"#map{0}\"><img alt=\"{1}\" width=\"{2}\" height=\"{3}\" "
         "src=\"data:image/png;base64,{4}\"></a><figcaption>{1}</figcaption><a class=\"close\" "
         "href=\"#map\">close</a></figure>\n",
         number, escape_html(picture.caption), picture.width, picture.height, base64(png));
   }
-  return html.empty() ? html : "<div class=\"maps\">\n" + html + "</div>\n";
+  std::string html;
+  if (!maps.empty()) html += "<div class=\"maps\">\n" + maps + "</div>\n";
+  if (!layers.empty()) {
+    html += "<div class=\"layers\">\n" + layers +
+            "</div>\n<p class=\"hint\">Layers are seen from above: base x to the right, y up.</p>\n";
+  }
+  return html;
+}
+
+/// The words of result.json as a person says them; any other text stays as it is.
+std::string reason_text(const std::string& reason) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kTexts = {{
+      {"occluded", "occluded: something stands between it and every place that the camera could take"},
+      {"out_of_range", "out of range: nearer to the camera than the sensor sees, or farther than it is trusted"},
+      {"out_of_reach", "out of reach: the arm could see it only from space that is not known to be free"},
+      {"no_return", "no return: looked at several times without an answer"},
+  }};
+  for (const auto& [word, text] : kTexts) {
+    if (reason == word) return std::string(text);
+  }
+  return reason;
 }
 
 std::string joints_text(const JointVector& joints_rad) {
   std::string text;
   for (int i = 0; i < joints_rad.size(); ++i) {
-    text += fmt::format("{}{:.0f}", i == 0 ? "" : "  ", joints_rad[i] * 180.0 / std::numbers::pi);
+    // Adding 0 to a rounded value turns -0 into 0.
+    text += fmt::format("{}{:.0f}", i == 0 ? "" : "  ", std::round(joints_rad[i] * 180.0 / std::numbers::pi) + 0.0);
   }
   return text;
 }
@@ -79,11 +105,12 @@ std::string map_section(const RunRecord& record) {
   if (!record.mapping) return section("map", "The map", paragraph("Nothing was mapped in this run."));
   const MappingRecord& m = *record.mapping;
   std::string body = map_pictures(record.map_pictures);
-  body += "<div class=\"figure\">\n" + voxel_chart(m.views) + "</div>\n" + counts_table(m);
+  body +=
+      "<h3>In the reach of the arm, view by view</h3>\n<div class=\"figure\">\n" + voxel_chart(m.views) + "</div>\n";
+  body += "<h3>The whole map at the end</h3>\n" + counts_table(m);
   body += fmt::format(
-      "<p class=\"hint\">Voxels of {:.0f} mm in the zone that the arm can reach. {} depth frames went into the map; {} "
-      "were "
-      "dropped because their pose or stamp could not be trusted.</p>\n",
+      "<p class=\"hint\">Voxels of {:.0f} mm. {} depth frames went into the map; {} were dropped because their pose or "
+      "stamp could not be trusted.</p>\n",
       m.resolution_m * 1e3, grouped(m.frames_integrated), grouped(m.frames_dropped));
   body +=
       "<p class=\"hint\">Files: <code>collision_map.bt</code> and <code>map.ot</code> (OctoMap), <code>map.ply</code> "
@@ -94,13 +121,28 @@ std::string map_section(const RunRecord& record) {
 
 std::string mapping_views_section(const RunRecord& record) {
   if (!record.mapping || record.mapping->views.empty()) return {};
-  HtmlTable table({"view", "phase", "time", "joints, degrees", "gain expected", "voxels gained", "unknown left"}, 4);
+  HtmlTable table({"view", "phase", "time", "joints, degrees", "gain expected", "learnt", "unknown left"}, 4);
   int number = 0;
+  std::optional<std::uint64_t> unknown_before;
   for (const MappingViewRecord& view : record.mapping->views) {
+    const auto learnt = unknown_before
+                            ? static_cast<std::int64_t>(*unknown_before) - static_cast<std::int64_t>(view.unknown)
+                            : static_cast<std::int64_t>(view.gain_seen);
+    unknown_before = view.unknown;
     table.row({fmt::format("{}", ++number), view.phase, duration_text(view.time_s), joints_text(view.joints_rad),
-               fmt::format("{:.0f}", view.gain_expected), grouped(view.gain_seen), grouped(view.unknown)});
+               view.gain_expected > 0
+                   ? grouped(static_cast<std::uint64_t>(std::llround(std::min(view.gain_expected, 1e12))))
+                   : std::string("–"),
+               learnt < 0 ? fmt::format("-{}", grouped(static_cast<std::uint64_t>(-learnt)))
+                          : grouped(static_cast<std::uint64_t>(learnt)),
+               grouped(view.unknown)});
   }
-  return section("views", "The views in order", table.html());
+  return section(
+      "views", "The views in order",
+      table.html("dense") +
+          "<p class=\"hint\">Voxels in the reach of the arm. Expected is what the view itself was thought to show when "
+          "it was chosen; learnt is by how much the unknown ones became fewer since the row above, on the "
+          "way there and at the view.</p>\n");
 }
 
 std::string remaining_section(const RunRecord& record) {
@@ -111,7 +153,7 @@ std::string remaining_section(const RunRecord& record) {
   }
   HtmlTable sums({"why", "clusters", "voxels", "litres"}, 1);
   for (const ReasonSum& sum : sums_by_reason(m.remaining)) {
-    sums.row({sum.reason, grouped(sum.clusters), grouped(sum.voxels), litres(sum.voxels, m.resolution_m)});
+    sums.row({reason_text(sum.reason), grouped(sum.clusters), grouped(sum.voxels), litres(sum.voxels, m.resolution_m)});
   }
   HtmlTable largest({"voxels", "litres", "centre in base, m", "why"}, 4);
   for (std::size_t i = 0; i < std::min(kClustersShown, m.remaining.size()); ++i) {
@@ -119,7 +161,7 @@ std::string remaining_section(const RunRecord& record) {
     largest.row(
         {grouped(cluster.voxels), litres(cluster.voxels, m.resolution_m),
          fmt::format("{:.2f}, {:.2f}, {:.2f}", cluster.center_m.x(), cluster.center_m.y(), cluster.center_m.z()),
-         cluster.reason});
+         reason_text(cluster.reason)});
   }
   std::string body =
       "<p>Clusters of unknown voxels that touch free space. They are obstacles for every motion.</p>\n" + sums.html();

@@ -30,8 +30,8 @@ std::string navigation(const RunRecord& record) {
   if (!record.calibration_views.empty()) link("calibration-views", "Board views");
   link("map", "Map");
   if (record.mapping) {
-    link("views", "Views");
     link("remaining", "Unknown");
+    link("views", "Views");
   }
   link("safety", "Safety");
   if (record.truth) link("truth", "Truth");
@@ -53,8 +53,8 @@ std::string report_html(const RunRecord& record) {
   html += hand_eye_section(record);
   html += calibration_views_section(record);
   html += map_section(record);
-  html += mapping_views_section(record);
   html += remaining_section(record);
+  html += mapping_views_section(record);
   html += safety_section(record);
   html += truth_section(record);
   html += memory_section(record);

@@ -19,7 +19,7 @@ nav{font-size:13px;margin-bottom:16px}nav a{color:var(--soft);margin-right:14px;
 .good{background:var(--good)}.caution{background:var(--caution)}.bad{background:var(--bad)}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(126px,1fr));gap:10px;margin-bottom:16px}
 .tile{background:var(--card);border:1px solid var(--rule);border-radius:10px;padding:11px 12px}
-.tile b{display:block;font-size:18px;font-weight:600;white-space:nowrap}.tile span{display:block;color:var(--soft);font-size:12.5px;line-height:1.35}
+.tile b{display:block;font-size:16.5px;font-weight:600;white-space:nowrap}.tile span{display:block;color:var(--soft);font-size:12.5px;line-height:1.35}
 section{background:var(--card);border:1px solid var(--rule);border-radius:10px;padding:18px 22px;margin-bottom:16px}
 h2{font-size:18px;margin:0 0 10px}h3{font-size:15px;margin:18px 0 6px}
 p{margin:8px 0}.hint{color:var(--soft);font-size:13.5px}
@@ -38,7 +38,8 @@ svg.chart{width:100%;height:auto;display:block}.chart text{font:12.5px system-ui
 .chart .dots{stroke-width:3;stroke-linecap:round;stroke-opacity:.45;fill:none}
 .figure{max-width:860px}.pair{display:grid;grid-template-columns:minmax(0,5fr) minmax(0,3fr);gap:18px;align-items:start}
 .shots{display:grid;grid-template-columns:repeat(auto-fill,minmax(230px,1fr));gap:14px}
-.maps{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:14px;margin-bottom:14px}
+.maps,.layers{display:grid;gap:14px;margin-bottom:14px;grid-template-columns:repeat(2,minmax(0,1fr))}.layers{grid-template-columns:repeat(3,minmax(0,1fr))}
+.dense td{padding:2px 10px 2px 0;font-size:13px}
 figure{margin:0}figcaption{font-size:12.8px;padding:4px 2px}figcaption span{color:var(--soft)}
 figure img,svg.shot{display:block;width:100%;height:auto;border-radius:6px}
 figure .close{display:none}
@@ -49,7 +50,7 @@ svg.shot .detected{stroke:var(--detected)}svg.shot .reprojected{stroke:var(--rep
 figure.shot:target{position:fixed;inset:0;z-index:9;background:rgba(16,20,26,.93);color:#fff;display:flex;flex-direction:column;align-items:center;justify-content:center;padding:24px}
 figure.shot:target>a:first-child{width:min(92vw,112vh)}figure.shot:target .close{display:block;color:#fff;margin-top:6px}figure.shot:target figcaption span{color:#c7ced6}
 footer{color:var(--soft);font-size:12.5px;text-align:center}
-@media(max-width:640px){.pair{grid-template-columns:1fr}}
+@media(max-width:640px){.pair,.maps,.layers{grid-template-columns:1fr}}
 @media print{body{background:#fff}section,.tile{break-inside:avoid;border-color:#ccc}nav{display:none}.banner{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 )css";
 

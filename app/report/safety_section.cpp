@@ -51,6 +51,9 @@ std::string safety_section(const RunRecord& record) {
       body +=
           paragraph(fmt::format("Least distance of the arm's body to anything not known free during the job: {} mm.",
                                 millimetres(*s.min_clearance_m)));
+      body +=
+          "<p class=\"hint\">Before the calibration the arm stays inside the safe zone, whose surface needs only the "
+          "smaller distance.</p>\n";
     }
     body += stops_html(s.stops);
   } else {

@@ -26,8 +26,12 @@ void take(Machine& m, const CalibrationViewResult& choice) {
   if (choice.target_met && enough && !stored_calibration(m)) {
     m.transition(StateId::kSolve);
   } else if (choice.found) {
-    m.show("calibration view {}: predicted sigma {:.2f} mm, {:.2f} mrad", p.observations + 1, choice.sigma_mm,
-           choice.sigma_mrad);
+    if (choice.sigma_mm > 0) {
+      m.show("calibration view {}: predicted sigma {:.2f} mm, {:.2f} mrad", p.observations + 1, choice.sigma_mm,
+             choice.sigma_mrad);
+    } else {
+      m.show("calibration view {}: a small turn, to learn where the camera sits", p.observations + 1);
+    }
     m.start_trip(choice.path, false);
   } else if (enough && !stored_calibration(m)) {
     m.transition(StateId::kSolve);

@@ -82,7 +82,7 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(keys_of(json["memory"]) == Keys{"budget_bytes", "peak_bytes", "loop_allocations_after_seal"});
   for (const char* key : {"started", "total_s", "stall_s", "rss_bytes"}) CHECK(json["wall"].contains(key));
   CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2", "contacts",
-                                       "unknown_entries", "coverage_of_observable", "false_free_voxels"});
+                                       "unknown_entries", "coverage_of_observable", "false_free_voxels", "regions"});
 }
 
 TEST_CASE("sections that did not run are null, and numbers that are not finite, too", "[report]") {
@@ -213,7 +213,8 @@ TEST_CASE("the page fetches nothing and tells the essentials", "[report]") {
   CHECK(page.find("<link") == std::string::npos);
   CHECK(page.find("url(") == std::string::npos);
   CHECK_THAT(page, Contains("class=\"banner good\"") && Contains("84.10") && Contains("ros2 run tf2_ros"));
-  CHECK_THAT(page, Contains("occluded: no reachable configuration sees it") && Contains("E5005"));
+  CHECK_THAT(page, Contains("occluded: something stands between") && Contains("out of range: nearer") &&
+                       Contains("E5005") && Contains("observed behind box, after the sweep"));
   std::size_t pictures = 0;
   for (std::size_t at = 0; (at = page.find("data:image/png;base64,", at)) != std::string::npos; ++at) ++pictures;
   CHECK(pictures == 18);

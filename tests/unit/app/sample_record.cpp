@@ -104,9 +104,9 @@ MappingRecord mapping() {
                        static_cast<std::uint64_t>(total) - free - occupied, free, occupied});
   }
   m.voxels = {m.views.back().unknown, m.views.back().free, m.views.back().occupied};
-  m.remaining = {{1850, "occluded: no reachable configuration sees it", {0.9, 0.3, 0.2}},
-                 {640, "out of range of the depth sensor", {-0.2, 0.1, -0.1}},
-                 {210, "occluded: no reachable configuration sees it", {0.7, -0.6, 0.5}}};
+  m.remaining = {{1850, "occluded", {0.9, 0.3, 0.2}},
+                 {640, "out_of_range", {-0.2, 0.1, -0.1}},
+                 {210, "occluded", {0.7, -0.6, 0.5}}};
   m.frames_integrated = 412;
   m.frames_dropped = 3;
   return m;
@@ -163,7 +163,7 @@ RunRecord make_record() {
   r.faults = {{151.2, Fault::kProgramStopped, "program stopped on the pendant"}};
   r.provenance = {"0.1.0", "ur5", "full", "cell: workshop\n", "77aa01"};
   r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, 180u << 20, "runs/20260131-7", 2};
-  r.truth = TruthRecord{0.21, 0.34, 4.7, 0, 0, 0.972, 41};
+  r.truth = TruthRecord{0.21, 0.34, 4.7, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }
 
