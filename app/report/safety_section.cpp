@@ -62,8 +62,7 @@ std::string safety_section(const RunRecord& record) {
   body += faults_html(record.faults);
   body +=
       "<p class=\"hint\">A map is not presence sensing: it shows what stood there when it was looked at. People must "
-      "be "
-      "guarded by the cell's own safety devices.</p>\n";
+      "be guarded by the cell's own safety devices.</p>\n";
   return section("safety", "Safety", body);
 }
 
