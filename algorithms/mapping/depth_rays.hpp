@@ -1,6 +1,7 @@
 /// The rays of a depth frame: which pixels count, and where each ends in base coordinates.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -31,6 +32,22 @@ struct PixelCounts {
   std::uint32_t pixels_self = 0;      ///< on the arm's own body: dropped
 };
 
+/// Where the ray of a pixel ends.
+struct RayEnd {
+  Eigen::Vector3f end_m = Eigen::Vector3f::Zero();  ///< base coordinates, rounded to float as octomap::point3d is
+  float reach_m = 0;                                ///< the end's depth along the optical axis
+  bool is_hit = false;                              ///< false: cut at range_m()
+};
+
+/// What became of a pixel. Only the first two have a ray.
+enum class PixelKind : std::uint8_t { kHit, kBeyond, kNoDirection, kEmpty, kSelf, kTooNear };
+
+/// One row of pixels, an array for each quantity. Those of pixels without a ray mean nothing.
+struct RayRow {
+  std::vector<PixelKind> kind;
+  std::vector<float> end_x_m, end_y_m, end_z_m, reach_m;  ///< as in RayEnd
+};
+
 /// The directions of a sensor's pixels; memory is taken at construction.
 class DepthRays {
  public:
@@ -40,72 +57,71 @@ class DepthRays {
   [[nodiscard]] const DepthSensor& sensor() const { return sensor_; }
   /// Where rays are cut: min(range_max_m, range_trusted_m).
   [[nodiscard]] double range_m() const { return range_m_; }
+  /// A pinhole image has one direction for each column and row; a distorted one does not.
+  [[nodiscard]] bool is_pinhole() const { return !per_pixel_; }
+  /// x / z of each column and y / z of each row of a pinhole image.
+  [[nodiscard]] std::span<const double> column_slopes() const { return ray_x_; }
+  [[nodiscard]] std::span<const double> row_slopes() const { return ray_y_; }
 
   /// Whether a frame can be used at all: size, depth scale, a pose that is a rigid motion, and a self filter that is
   /// empty or has the frame's size. @return kFrameRefused
   [[nodiscard]] Status check(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                              std::span<const float> self_depth_m) const;
 
-  /// Calls visit(end_m, is_hit) for each ray of a frame that passes check(): ends in base coordinates, rounded to float
-  /// as octomap::point3d is, cut at range_m() (is_hit is false then).
+  /// Calls visit(v, RayRow) for each row of a frame that passes check().
+  template <typename Visit>
+  PixelCounts for_each_row(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                           std::span<const float> self_depth_m, Visit visit);
+  /// Calls visit(RayEnd) for each ray of such a frame.
   template <typename Visit>
   PixelCounts for_each(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
-                       std::span<const float> self_depth_m, Visit visit) const;
+                       std::span<const float> self_depth_m, Visit visit);
+
+  /// The ray of one pixel again; it must have one.
+  [[nodiscard]] RayEnd ray(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth, int u, int v);
 
   /// The smallest box around the sensor and all ray ends of a frame that passes check().
-  [[nodiscard]] AxisBox bounds(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth) const;
+  [[nodiscard]] AxisBox bounds(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth);
 
  private:
+  void compute_row(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                   std::span<const float> self_depth_m, int v);
+
   DepthSensor sensor_;
   double range_m_ = 0;
   bool per_pixel_ = false;     ///< a distorted image has a direction for each pixel
   std::vector<double> ray_x_;  ///< x / z for each column or pixel; NaN where the lens model has no ray
   std::vector<double> ray_y_;  ///< y / z for each row or pixel
+  RayRow row_;
+  std::vector<double> row_y_, row_z_m_, row_distance_m_;
 };
 
 template <typename Visit>
-PixelCounts DepthRays::for_each(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
-                                std::span<const float> self_depth_m, Visit visit) const {
-  const Eigen::Matrix3d rotation = base_T_depth.rotation();
-  const Eigen::Vector3d translation_m = base_T_depth.translation();
-  const Eigen::Vector3f origin_m = translation_m.cast<float>();
-  const auto cut_m = static_cast<float>(range_m_);
-  PixelCounts counts;
-  std::size_t pixel = 0;
-  for (int row = 0; row < depth.pixels.height; ++row) {
-    for (int column = 0; column < depth.pixels.width; ++column, ++pixel) {
-      const std::uint16_t value = depth.pixels.data[pixel];
-      const double x = ray_x_[per_pixel_ ? pixel : static_cast<std::size_t>(column)];
-      const double y = ray_y_[per_pixel_ ? pixel : static_cast<std::size_t>(row)];
-      if (value == 0 || std::isnan(x)) {
-        ++counts.pixels_empty;
-        continue;
-      }
-      const double z_m = value / depth.units_per_m;
-      if (!self_depth_m.empty() && z_m >= static_cast<double>(self_depth_m[pixel])) {
-        ++counts.pixels_self;
-        continue;
-      }
-      if (z_m < sensor_.range_min_m) {
-        ++counts.pixels_too_near;
-        continue;
-      }
-      const Eigen::Vector3f end_m = (rotation * Eigen::Vector3d(x * z_m, y * z_m, z_m) + translation_m).cast<float>();
-      const Eigen::Vector3f ray_m = end_m - origin_m;
-      const float squared = ray_m.x() * ray_m.x() + ray_m.y() * ray_m.y() + ray_m.z() * ray_m.z();
-      const double distance_m = std::sqrt(static_cast<double>(squared));
-      if (distance_m <= range_m_) {
-        ++counts.pixels_used;
-        visit(end_m, true);
-        continue;
-      }
-      ++counts.pixels_beyond;
-      // A distance that overflows has no direction left; nothing is cleared then.
-      if (!std::isfinite(squared)) continue;
-      visit(Eigen::Vector3f(origin_m + ray_m / static_cast<float>(distance_m) * cut_m), false);
-    }
+PixelCounts DepthRays::for_each_row(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                                    std::span<const float> self_depth_m, Visit visit) {
+  std::array<std::uint32_t, 6> counted{};
+  for (int v = 0; v < depth.pixels.height; ++v) {
+    compute_row(depth, base_T_depth, self_depth_m, v);
+    for (const PixelKind kind : row_.kind) ++counted[static_cast<std::size_t>(kind)];
+    visit(v, row_);
   }
-  return counts;
+  const auto count = [&counted](PixelKind kind) { return counted[static_cast<std::size_t>(kind)]; };
+  return {.pixels_used = count(PixelKind::kHit),
+          .pixels_beyond = count(PixelKind::kBeyond) + count(PixelKind::kNoDirection),
+          .pixels_empty = count(PixelKind::kEmpty),
+          .pixels_too_near = count(PixelKind::kTooNear),
+          .pixels_self = count(PixelKind::kSelf)};
+}
+
+template <typename Visit>
+PixelCounts DepthRays::for_each(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                                std::span<const float> self_depth_m, Visit visit) {
+  return for_each_row(depth, base_T_depth, self_depth_m, [&](int, const RayRow& row) {
+    for (std::size_t u = 0; u < row.kind.size(); ++u) {
+      if (row.kind[u] > PixelKind::kBeyond) continue;
+      visit(RayEnd{{row.end_x_m[u], row.end_y_m[u], row.end_z_m[u]}, row.reach_m[u], row.kind[u] == PixelKind::kHit});
+    }
+  });
 }
 
 }  // namespace firstlook

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "algorithms/mapping/depth_rays.hpp"
+#include "algorithms/mapping/range_image.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 
 namespace firstlook {
@@ -32,10 +33,19 @@ class Inserter {
   [[nodiscard]] const DepthSensor& sensor() const { return rays_.sensor(); }
 
  private:
-  Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
+  [[nodiscard]] Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
+  void mark_hit(std::int32_t index);
+  /// Two ways to the same marks: along every ray of any image, or by the voxels of a pinhole image (much faster).
+  void mark_by_rays(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                    std::span<const float> self_depth_m, PixelCounts& counts);
+  void mark_by_voxels(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                      std::span<const float> self_depth_m, PixelCounts& counts);
 
   GridGeometry geometry_;
   DepthRays rays_;
+  RangeImage image_;
+  std::vector<float> row_reach_m_;
+  std::vector<std::int32_t> row_index_;
   std::vector<std::uint64_t> missed_;
   std::vector<std::uint64_t> hit_;
 };

@@ -1,5 +1,6 @@
 #include "algorithms/mapping/ray_marker.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -92,6 +93,23 @@ void RayMarker::mark_passed(const Eigen::Vector3f& end_m) {
     walk<false>(w);
   else
     walk<true>(w);
+}
+
+bool RayMarker::passes(const Eigen::Vector3f& end_m, const Eigen::Vector3i& voxel) const {
+  const Eigen::Vector3i end = octomap_voxel(geometry_, end_m);
+  if (end == origin_) return false;
+  Walk w = start(end_m, end);
+  Eigen::Vector3i at = origin_;
+  // Every step leads away from the origin: so many steps lead to the voxel, or past it.
+  const int needed = (voxel - origin_).cwiseAbs().sum();
+  for (int step = 1; step <= needed; ++step) {
+    const auto& [x, y, z] = w.next;
+    const std::size_t axis = x < y && x < z ? 0 : !(x < y) && y < z ? 1 : 2;
+    w.next[axis] += w.delta[axis];
+    at[static_cast<int>(axis)] += w.index_step[axis] > 0 ? 1 : -1;
+    if (at == end || std::min({w.next[0], w.next[1], w.next[2]}) > w.length) return false;
+  }
+  return at == voxel;
 }
 
 // OctoMap stops at the end's voxel, or where the next boundary lies beyond the ray's length (rounding can lead past the

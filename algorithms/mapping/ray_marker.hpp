@@ -20,6 +20,9 @@ class RayMarker {
   /// Marks every voxel from the origin's to the one before that of `end_m`; none when both are one voxel.
   void mark_passed(const Eigen::Vector3f& end_m);
 
+  /// Whether mark_passed() would mark this voxel (relative to the grid); marks nothing.
+  [[nodiscard]] bool passes(const Eigen::Vector3f& end_m, const Eigen::Vector3i& voxel) const;
+
  private:
   /// One ray of the walk. Packed coordinates hold three fields of 21 bits, biased so that none is negative.
   struct Walk {

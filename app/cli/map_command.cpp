@@ -35,7 +35,7 @@ std::unexpected<Error> refused(const MappingFrame& frame, const Error& error) {
 }
 
 // The grid that holds every ray of every frame.
-Result<GridGeometry> fit_extents(const MappingDataset& dataset, const DepthRays& rays, double resolution_m) {
+Result<GridGeometry> fit_extents(const MappingDataset& dataset, DepthRays& rays, double resolution_m) {
   AxisBox box;
   for (const MappingFrame& frame : dataset.frames) {
     const Result<DepthPixels> image = read_depth_png(frame.image);
@@ -80,7 +80,8 @@ struct Mapped {
 
 Result<Mapped> map_dataset(const MappingDataset& dataset, const MapCommandOptions& options) {
   const DepthSensor sensor = offline_sensor(dataset, options.range_max_m);
-  const Result<GridGeometry> geometry = fit_extents(dataset, DepthRays(sensor), options.resolution_m);
+  DepthRays rays(sensor);
+  const Result<GridGeometry> geometry = fit_extents(dataset, rays, options.resolution_m);
   if (!geometry) return std::unexpected(geometry.error());
   fmt::print(stderr, "grid of {} x {} x {} voxels of {} m\n", geometry->size.x(), geometry->size.y(),
              geometry->size.z(), options.resolution_m);
