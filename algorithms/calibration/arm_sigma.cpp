@@ -78,6 +78,18 @@ std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views, st
   return solution;
 }
 
+namespace {
+
+/// Root of the mean square, with the expected value as six further squares where that raises it.
+double next_sigma(double squares, double axes, double expected) {
+  constexpr double kExpectedAxes = 6;
+  const double mean = squares / axes;
+  const double expected2 = expected * expected;
+  return std::sqrt(mean < expected2 ? (squares + kExpectedAxes * expected2) / (axes + kExpectedAxes) : mean);
+}
+
+}  // namespace
+
 ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Matrix6d> covariances,
                         const RefinementOptions& options) {
   double translation2 = 0, rotation2 = 0;
@@ -88,10 +100,12 @@ ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Ma
   const double axes = 3.0 * static_cast<double>(deviations.size());
   ArmSigma next = options.arm_sigma;
   if (next.translation_m <= 0) {
-    next.translation_m = std::max(options.arm_sigma_min.translation_m, std::sqrt(translation2 / axes));
+    next.translation_m = std::max(options.arm_sigma_min.translation_m,
+                                  next_sigma(translation2, axes, options.arm_sigma_expected.translation_m));
   }
   if (next.rotation_rad <= 0) {
-    next.rotation_rad = std::max(options.arm_sigma_min.rotation_rad, std::sqrt(rotation2 / axes));
+    next.rotation_rad = std::max(options.arm_sigma_min.rotation_rad,
+                                 next_sigma(rotation2, axes, options.arm_sigma_expected.rotation_rad));
   }
   return next;
 }

@@ -22,6 +22,9 @@ struct RefinementOptions {
   ArmSigma arm_sigma;          ///< 0: estimated (each by itself)
   /// Lower bounds of the estimates: below the repeatability of good arms, far above rounding.
   ArmSigma arm_sigma_min{2e-5, 2e-5};
+  /// What the arm is known to be good for; 0: nothing is known. Few views tell the arm's share of the errors badly from
+  /// the camera's, and the estimate then falls to its lower bound: below this it counts like two views of its own.
+  ArmSigma arm_sigma_expected;
   double corner_sigma_min_px = 0.01;
   double corner_loss_scale = 3.0;  ///< Huber: corner errors above this many sigmas count linearly
   double view_gate = 6.0;          ///< views whose misfit is more than this many robust sigmas are left out

@@ -61,11 +61,12 @@ double pair_margin(const Capsules& placed, const SelfPair& pair) {
   return segment_distance_m(n.a, n.b, f.a, f.b) - pair.axes_apart_m;
 }
 
-bool within_limits(const ArmModel& arm, const JointVector& q) {
+/// Whether every joint is at least `margin_rad` inside its limits.
+bool within_limits(const ArmModel& arm, const JointVector& q, double margin_rad) {
   if (q.size() != arm.joints || !q.all_finite()) return false;
   for (int j = 0; j < arm.joints; ++j) {
     const auto i = static_cast<std::size_t>(j);
-    if (q[j] < arm.lower_rad[i] || q[j] > arm.upper_rad[i]) return false;
+    if (q[j] < arm.lower_rad[i] + margin_rad || q[j] > arm.upper_rad[i] - margin_rad) return false;
   }
   return true;
 }
@@ -127,7 +128,7 @@ class Proof {
   }
 
   bool end_is_free(const JointVector& q, double fraction, CertificateVerdict verdict) {
-    if (!within_limits(arm_, q)) return fail(verdict, fraction, -1, false, -kInfinity);
+    if (!within_limits(arm_, q, -kLimitTolerance_rad)) return fail(verdict, fraction, -1, false, -kInfinity);
     ++result_.evaluations;
     const Capsules placed = place(body_.capsules, forward(arm_, q));
     for (std::size_t i = 0; i < placed.size(); ++i) {
@@ -218,6 +219,7 @@ double configuration_margin(const ArmModel& arm, const Body& body, const FreeSpa
 
 bool configuration_is_free(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
                            const JointVector& q_rad, double margin_m) {
+  if (!within_limits(arm, q_rad, kLimitMargin_rad)) return false;
   const Capsules placed = place(body.capsules, forward(arm, q_rad));
   for (std::size_t i = placed.size(); i-- > 0;) {  // the outermost capsules fail most often
     if (body.exempt[i] == 0 && !(capsule_margin(space, clearance, placed[i], {margin_m, margin_m}) >= margin_m))

@@ -12,6 +12,9 @@ namespace firstlook {
 inline constexpr double kAxisSpacing_m = 0.01;
 /// What a configuration needs beyond the clearance to be moved from or to: the certificate's bisection ends there.
 inline constexpr double kMarginMin_m = 2e-4;
+/// Targets keep this inside the joint limits; where the arm stands may be beyond them by what encoders round.
+inline constexpr double kLimitMargin_rad = 0.01;
+inline constexpr double kLimitTolerance_rad = 1e-3;
 
 /// How much the body clears everything that is not free, and itself, beyond what is required (a lower bound: at most
 /// kAxisSpacing_m / 2 below what zone, field and keep-outs say along the axes, exact in the zone). Negative: not
@@ -19,7 +22,8 @@ inline constexpr double kMarginMin_m = 2e-4;
 [[nodiscard]] double configuration_margin(const ArmModel& arm, const Body& body, const FreeSpace& space,
                                           const Clearance& clearance, const JointVector& q_rad);
 
-/// The same as configuration_margin >= margin_m, faster.
+/// The same as configuration_margin >= margin_m, faster; besides, q_rad must be kLimitMargin_rad inside the joint
+/// limits.
 [[nodiscard]] bool configuration_is_free(const ArmModel& arm, const Body& body, const FreeSpace& space,
                                          const Clearance& clearance, const JointVector& q_rad,
                                          double margin_m = kMarginMin_m);
@@ -39,8 +43,8 @@ struct Certificate {
 
 /// Proves that the margin stays >= 0 on the whole segment between two configurations, or says where it cannot.
 /// Intervals are bisected until the margin at the middle exceeds how far any point of the capsule can move within the
-/// interval (twist.hpp); nothing is sampled at a step size. Ends need kMarginMin_m; a configuration outside the joint
-/// limits counts as blocked. 7 to 35 us for 0.6 rad.
+/// interval (twist.hpp); nothing is sampled at a step size. Ends need kMarginMin_m; a configuration more than
+/// kLimitTolerance_rad outside the joint limits counts as blocked. 7 to 35 us for 0.6 rad.
 [[nodiscard]] Certificate certify(const ArmModel& arm, const Body& body, const FreeSpace& space,
                                   const Clearance& clearance, const JointVector& from, const JointVector& to);
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t kStream = 4400;  // of random numbers; one for each choice
 constexpr std::size_t kFeasibleMax = 400;
-constexpr double kNearby_rad = 0.25;       // standard deviation of each joint around an earlier view
+constexpr double kNearby_rad = 0.3;        // standard deviation of each joint around an earlier view
 constexpr double kTargetMargin_m = 0.005;  // states with less trap the arm (FACTS 3)
 constexpr double kDegree_rad = std::numbers::pi / 180;
 
@@ -34,8 +34,9 @@ struct Search {
 };
 
 bool is_new(const Search& s, const JointVector& q) {
-  return std::all_of(s.inputs.taken.begin(), s.inputs.taken.end(),
-                     [&](const JointVector& other) { return (q - other).max_abs() >= s.options.different_min_rad; });
+  return std::all_of(s.inputs.taken.begin(), s.inputs.taken.end(), [&](const JointVector& other) {
+    return joint_distance_rad(q, other) >= s.options.different_min_rad;
+  });
 }
 
 /// Keeps q when it is new, sees the whole board, is free and does not hide the board: from cheap to dear.
@@ -87,7 +88,8 @@ void draw_nearby(Search& s) {
     JointVector q = pick == 0 ? s.current : s.inputs.taken[static_cast<std::size_t>(pick) - 1];
     for (int j = 0; j < arm.joints; ++j) {
       const auto at = static_cast<std::size_t>(j);
-      q[j] = std::clamp(q[j] + kNearby_rad * s.random.normal(), arm.lower_rad[at], arm.upper_rad[at]);
+      q[j] = std::clamp(q[j] + kNearby_rad * s.random.normal(), arm.lower_rad[at] + kLimitMargin_rad,
+                        arm.upper_rad[at] - kLimitMargin_rad);
     }
     consider(s, q);
   }

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "algorithms/calibration/view_design.hpp"
+#include "algorithms/calibration/view_spread.hpp"
 #include "algorithms/motion/planner.hpp"
 #include "algorithms/view_planning/base_turns.hpp"
 
@@ -29,11 +30,11 @@ struct CalibrationViewOptions {
   ViewLimits limits;             ///< margin, tilt and distance at which the whole board must be seen
   double distance_min_m = 0.35;  ///< of aimed poses: from near by corners tell most (FACTS 2)
   double distance_max_m = 0.8;
-  double tilt_max_rad = 0.785;     ///< of aimed poses: 45 degrees
-  double different_min_rad = 0.1;  ///< some joint must differ so much from every view taken
-  double cost_lever_m = 1.0;       ///< design_cost: rotation counts as displacement at this distance
-  double cost_drop_min = 0.005;    ///< a view must lower the cost by this share
-  int plans_max = 12;              ///< best candidates that the planner may try
+  double tilt_max_rad = 0.785;                      ///< of aimed poses: 45 degrees
+  double different_min_rad = kSharedDeviation_rad;  ///< joint distance to every view taken
+  double cost_lever_m = 1.0;                        ///< design_cost: rotation counts as displacement at this distance
+  double cost_drop_min = 0.005;                     ///< a view must lower the cost by this share
+  int plans_max = 12;                               ///< best candidates that the planner may try
   int plan_iterations_max = 600;
   SpeedLimits speed;  ///< for the path's duration
 };

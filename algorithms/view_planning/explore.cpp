@@ -79,7 +79,8 @@ JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
   JointVector q = pick == 0 ? task.current : visited_[static_cast<std::size_t>(pick) - 1];
   for (int j = 0; j < arm.joints; ++j) {
     const auto i = static_cast<std::size_t>(j);
-    q[j] = std::clamp(q[j] + kNearby_rad * random.normal(), arm.lower_rad[i], arm.upper_rad[i]);
+    q[j] = std::clamp(q[j] + kNearby_rad * random.normal(), arm.lower_rad[i] + kLimitMargin_rad,
+                      arm.upper_rad[i] - kLimitMargin_rad);
   }
   return q;
 }

@@ -1,25 +1,40 @@
 /// Jobs of the calibration: the next view of the board, the solve, the verdict.
 #include <algorithm>
 
+#include "algorithms/calibration/view_spread.hpp"
 #include "algorithms/vision/camera_model.hpp"
 #include "app/jobs/workbench.hpp"
 
 namespace firstlook {
 namespace {
+constexpr double kCrowded_rad = 0.1;        // joint distance of views where there is no room for more
+constexpr std::size_t kIndependentMin = 6;  // of so many views a solve can make something
 constexpr std::size_t kBootstrapViews = 4;  // three motions determine a rough transform, one more for a bad view
+}  // namespace
+
+/// The views that count: those that share an arm deviation with a later one are left out, unless few would remain.
+std::vector<std::size_t> Workbench::independent_observations() const {
+  std::vector<JointVector> configurations;
+  for (const Observation& o : observations_) configurations.push_back(o.joints_rad);
+  const auto apart = spread_views(configurations);
+  return apart.size() >= kIndependentMin ? apart : spread_views(configurations, 0);
 }
 
 std::vector<CalibrationView> Workbench::views() const {
   std::vector<CalibrationView> views;
-  views.reserve(observations_.size());
-  for (const Observation& o : observations_) views.push_back(o.view);
+  for (const std::size_t i : independent_observations()) views.push_back(observations_[i].view);
   return views;
+}
+
+ArmSigma Workbench::arm_sigma_expected() const {
+  return {config_.calibration.robot_sigma_mm * 1e-3, config_.calibration.robot_sigma_mrad * 1e-3};
 }
 
 HandEyeOptions Workbench::solve_options() const {
   HandEyeOptions options;
   options.solver = find_solver(config_.calibration.solver).value_or(Solver::kParkMartin);
   options.seed = static_cast<std::uint64_t>(config_.seed);
+  options.refinement.arm_sigma_expected = arm_sigma_expected();
   VerdictLimits& limits = options.limits;
   limits.views_min = std::min(config_.calibration.views_min, 6);
   limits.sigma_translation_max_m = config_.calibration.sigma_max_mm * 1e-3;
@@ -45,12 +60,13 @@ std::optional<ViewDesignModel> Workbench::rough_model() const {
   model.flange_T_camera = *rough;
   model.base_T_board = mean_board_pose(pairs, *rough);
   model.corner_sigma_px = config_.calibration.corner_sigma_px;
-  model.arm_sigma = {config_.calibration.robot_sigma_mm * 1e-3, config_.calibration.robot_sigma_mrad * 1e-3};
+  model.arm_sigma = arm_sigma_expected();
   RefinementOptions options;
   options.corner_sigma_px = model.corner_sigma_px;
   options.arm_sigma = model.arm_sigma;
   options.rounds_max = 1;
-  const auto taken = views();
+  std::vector<CalibrationView> taken;
+  for (const Observation& o : observations_) taken.push_back(o.view);
   if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) {
     model.flange_T_camera = refined->flange_T_camera;
     model.base_T_board = refined->base_T_board;
@@ -89,9 +105,9 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   if (!model) return next_bootstrap_view(here);
   Matrix12d information = prior_information();
   std::vector<JointVector> taken;
-  for (const Observation& o : observations_) {
-    information += view_information(*model, o.view.base_T_flange);
-    taken.push_back(o.joints_rad);
+  for (const std::size_t i : independent_observations()) {
+    information += view_information(*model, observations_[i].view.base_T_flange);
+    taken.push_back(observations_[i].joints_rad);
   }
   CalibrationViewOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
@@ -106,12 +122,18 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   result.sigma_mrad = 1000 * sigma.rotation_rad;
   result.target_met = result.sigma_mm <= config_.calibration.target_sigma_mm &&
                       result.sigma_mrad <= config_.calibration.target_sigma_mrad;
-  const auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
-  if (choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen) {
+  auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
+  const auto found = [&] { return choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen; };
+  const bool too_few = observations_.size() < static_cast<std::size_t>(config_.calibration.views_min);
+  if (!found() && too_few) {
+    options.different_min_rad = kCrowded_rad;  // few places see the board: views side by side are better than none
+    choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
+  }
+  if (found()) {
     result.found = true;
     result.path = route_of(choice->path, envelope_body_, limits_);
-  } else if (observations_.size() < static_cast<std::size_t>(config_.calibration.views_min)) {
-    return next_bootstrap_view(here);  // few places see the board: take what there is
+  } else if (too_few) {
+    return next_bootstrap_view(here);
   }
   return result;
 }

@@ -116,7 +116,9 @@ class Workbench {
   void keep_picture(std::size_t observation);
   [[nodiscard]] std::optional<ViewDesignModel> rough_model() const;
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
+  [[nodiscard]] ArmSigma arm_sigma_expected() const;
   [[nodiscard]] HandEyeOptions solve_options() const;
+  [[nodiscard]] std::vector<std::size_t> independent_observations() const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
   void begin_mapping();
   void rebuild_free_space(double now_s);

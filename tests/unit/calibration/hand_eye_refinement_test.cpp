@@ -216,3 +216,18 @@ TEST_CASE("hostile input is refused", "[calibration]") {
   bad.fx = 0;
   CHECK(refine_hand_eye(bad, setup.board, views, start).error().fault == Fault::kDataMalformed);
 }
+
+TEST_CASE("what is expected of the arm holds up a sigma that few views tell badly", "[calibration]") {
+  const Setup setup;  // a good arm
+  RefinementOptions expecting;
+  expecting.arm_sigma_expected = setup.arm_sigma;
+  const Trials alone = run_trials(setup, 8, 40);
+  const Trials held = run_trials(setup, 8, 40, expecting);
+  CHECK(held.log_arm_translation > alone.log_arm_translation + 0.1);
+  CHECK(std::abs(held.log_arm_translation) < 0.25);
+  CHECK(held.normalized < alone.normalized);
+  CHECK(held.normalized > 3.5);
+  // An arm that is worse than expected is found out all the same.
+  expecting.arm_sigma_expected = {setup.arm_sigma.translation_m / 5, setup.arm_sigma.rotation_rad / 5};
+  CHECK(run_trials(setup, 20, 30, expecting).log_arm_translation > -0.2);
+}

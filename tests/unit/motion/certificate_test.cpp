@@ -158,6 +158,25 @@ TEST_CASE("ends outside the joint limits are blocked") {
   CHECK(certify(arm, body, space, {}, beyond, default_start(arm)).verdict == CertificateVerdict::kStartBlocked);
 }
 
+TEST_CASE("an arm that encoders put just beyond a limit can move away, but no target is put there") {
+  const ArmModel arm = *find_arm_model("ur5");
+  const Body body = bare_body(arm);
+  FreeSpace space;
+  space.zone.radius_m = 3;
+  space.zone.height_m = 3;
+  JointVector at = default_start(arm);
+  JointVector inside = at;
+  at[5] = arm.upper_rad[5] + 0.5 * kLimitTolerance_rad;
+  CHECK(certify(arm, body, space, {}, at, inside).certified());
+  CHECK_FALSE(configuration_is_free(arm, body, space, {}, at));
+  at[5] = arm.upper_rad[5] + 2 * kLimitTolerance_rad;
+  CHECK(certify(arm, body, space, {}, at, inside).verdict == CertificateVerdict::kStartBlocked);
+  inside[5] = arm.upper_rad[5] - 0.5 * kLimitMargin_rad;
+  CHECK_FALSE(configuration_is_free(arm, body, space, {}, inside));
+  inside[5] = arm.upper_rad[5] - 1.5 * kLimitMargin_rad;
+  CHECK(configuration_is_free(arm, body, space, {}, inside));
+}
+
 TEST_CASE("a thin obstacle between two free ends is never jumped over") {
   const ArmModel arm = *find_arm_model("ur5");
   const Body body = bare_body(arm);
