@@ -175,7 +175,7 @@ class ScriptedWorld : public DecisionSink {
   void answer(const Job& job, const T& result) {
     std::vector<std::byte> bytes(16384);
     const std::size_t size = pack(result, std::span<std::byte>(bytes));
-    machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size)});
+    machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size), {}});
   }
   ViewList views_around(const JointVector& at, int count) const {
     ViewList list;
@@ -239,6 +239,8 @@ class ScriptedWorld : public DecisionSink {
           break;
         case JobKind::kSummarize:
           answer(job, SummarizeResult{});
+          break;
+        case JobKind::kForgetKnownFree:  // the shell's own
           break;
       }
     }
