@@ -228,11 +228,11 @@ int run(const Command& command) {
     const int code = std::visit(Dispatch{}, command);
     return flush_stdout() ? code : kData;
   } catch (const std::system_error& refused) {
-    const auto error = failure(Fault::kDiskWrite, "{}", refused.what());
-    return fail(error.error());
+    std::fprintf(stderr, "firstlook: E%d cannot write: %s\n", static_cast<int>(Fault::kDiskWrite), refused.what());
+    return kData;
   } catch (const std::exception& unexpected) {
-    const auto error = failure(Fault::kInternal, "{}", unexpected.what());
-    return fail(error.error());
+    std::fprintf(stderr, "firstlook: E%d internal fault: %s\n", static_cast<int>(Fault::kInternal), unexpected.what());
+    return kInternal;
   }
 }
 
