@@ -194,8 +194,7 @@ TEST_CASE("the nearest name", "[config]") {
 }
 
 TEST_CASE("the program's version is the build's", "[config]") {
-  const auto root = std::filesystem::path(__FILE__).parent_path() / ".." / ".." / "..";
-  std::ifstream file(root / "CMakeLists.txt");
+  std::ifstream file(std::filesystem::path(FIRSTLOOK_SOURCE_DIR) / "CMakeLists.txt");
   const std::string cmake((std::istreambuf_iterator<char>(file)), {});
   CHECK_THAT(cmake, Contains("project(firstlook VERSION " + version_text() + " "));
 }
