@@ -1,6 +1,10 @@
 /// firstlook: the only file that names concrete devices.
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <exception>
 #include <string>
+#include <system_error>
 
 #include "app/cli/cli.hpp"
 #include "app/machine/state_table.hpp"
@@ -112,7 +116,7 @@ TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
   return truth;
 }
 
-void narrate_result(const RunRecord& record, const std::string& folder, Narrator& narrator) {
+void narrate_result(const RunRecord& record, Narrator& narrator) {
   narrator.clear_progress();
   narrator.line(fmt::format("{}: {}", name_of(record.outcome), record.reason));
   if (record.hand_eye) {
@@ -128,13 +132,16 @@ void narrate_result(const RunRecord& record, const std::string& folder, Narrator
   }
   if (record.truth) {
     const TruthRecord& t = *record.truth;
-    narrator.line(
-        fmt::format("truth     hand-eye off by {:.2f} mm, {:.2f} mrad; {} contacts, {} entries into unknown space; "
-                    "{:.1f} % of the observable voxels known",
-                    t.hand_eye_error_mm.value_or(0), t.hand_eye_error_mrad.value_or(0), t.contacts, t.unknown_entries,
-                    100 * t.coverage_of_observable.value_or(0)));
+    std::string line = "truth     ";
+    if (t.hand_eye_error_mm && t.hand_eye_error_mrad) {
+      line += fmt::format("hand-eye off by {:.2f} mm, {:.2f} mrad; ", *t.hand_eye_error_mm, *t.hand_eye_error_mrad);
+    }
+    line += fmt::format("{} contacts, {} entries into unknown space", t.contacts, t.unknown_entries);
+    if (record.mapping && t.coverage_of_observable) {
+      line += fmt::format("; {:.1f} % of the observable voxels known", 100 * *t.coverage_of_observable);
+    }
+    narrator.line(line);
   }
-  narrator.line(fmt::format("report    {}/report.html", folder));
 }
 
 int run_job(const RunCommand& command) {
@@ -149,7 +156,7 @@ int run_job(const RunCommand& command) {
   }
   const std::string folder =
       command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
-  if (const Status prepared = prepare_run_folder(folder); !prepared) return fail(prepared.error());
+  if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
 
   auto cell = sim::make_simulated_cell(
       {config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor, command.faults, config.workers});
@@ -179,17 +186,26 @@ int run_job(const RunCommand& command) {
   world.grader().watch(nullptr);
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";
   record.wall.folder = folder;
-  if (const Status written = write_run_files(folder, record, (*cart)->map_files()); !written) {
-    return fail(written.error());
-  }
+  narrate_result(record, narrator);
   if (command.record) {
     if (const Status written = write_calibration_recording(folder + "/dataset", record, config); !written) {
       return fail(written.error());
     }
   }
-  narrate_result(record, folder, narrator);
+  if (const Status written = write_run_files(folder, record, (*cart)->map_files()); !written) {
+    return fail(written.error());
+  }
+  narrator.line(fmt::format("report    {}/report.html", folder));
   if (command.json) std::printf("%s", result_json(record).c_str());
-  return ran ? exit_code_of((*cart)->ending()) : kInternal;
+  return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());
+}
+
+/// Data that nobody received must not look like success: a full disk shows itself only here.
+bool flush_stdout() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return true;
+  std::fprintf(stderr, "firstlook: E%d cannot write to stdout: %s\n", static_cast<int>(Fault::kDiskWrite),
+               std::strerror(errno));
+  return false;
 }
 
 struct Dispatch {
@@ -205,11 +221,26 @@ struct Dispatch {
   int operator()(const ConfigCommandOptions& c) const { return run_config_command(c); }
 };
 
+/// Runs a command. Exceptions end here, with the exit code of what they mean: fmt throws std::system_error when stdout
+/// takes nothing more; whatever else comes so far is a fault of the program.
+int run(const Command& command) {
+  try {
+    const int code = std::visit(Dispatch{}, command);
+    return flush_stdout() ? code : kData;
+  } catch (const std::system_error& refused) {
+    std::fprintf(stderr, "firstlook: E%d cannot write: %s\n", static_cast<int>(Fault::kDiskWrite), refused.what());
+    return kData;
+  } catch (const std::exception& unexpected) {
+    std::fprintf(stderr, "firstlook: E%d internal fault: %s\n", static_cast<int>(Fault::kInternal), unexpected.what());
+    return kInternal;
+  }
+}
+
 }  // namespace
 }  // namespace firstlook
 
 int main(int argc, char** argv) {
   const auto parsed = firstlook::parse_command_line(argc, argv);
   if (!parsed.command) return parsed.exit_code;
-  return std::visit(firstlook::Dispatch{}, *parsed.command);
+  return firstlook::run(*parsed.command);
 }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "platform/loop/worker_pool.hpp"
+
 namespace firstlook {
 namespace {
 
@@ -19,7 +21,12 @@ using Keys = std::vector<ConfigKey>;
 void add_job_keys(Keys& keys, Config& c) {
   keys.push_back({"cell", &c.cell, 0, 0, {}, "simulated cell: a built-in name, random:SEED, or a YAML file"});
   keys.push_back({"seed", &c.seed, 0, kSeedMax, {}, "of every random number: one seed, one result"});
-  keys.push_back({"workers", &c.workers, 1, 16, {}, "threads for heavy work; the result is the same for any number"});
+  keys.push_back({"workers",
+                  &c.workers,
+                  1,
+                  WorkerPool::kWorkersMax,
+                  {},
+                  "threads for heavy work; the result is the same for any number"});
   keys.push_back({"start_source", &c.start_source, 0, 0, kStartSources,
                   "what starts a job: Play on the pendant, or the panel's button within 60 s of Play"});
 }

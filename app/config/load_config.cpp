@@ -284,7 +284,9 @@ Result<LoadedConfig> load_config(const ConfigSources& sources) {
   const std::vector<ConfigKey> keys = config_keys(loaded.config);
   if (Status status = apply_environment(sources.environment, keys); !status) return std::unexpected(status.error());
   for (const ConfigOverride& flag : sources.flags) {
-    if (Status status = apply_override(flag, keys); !status) return std::unexpected(status.error());
+    if (const Status status = apply_override(flag, keys); !status) {
+      return failure(Fault::kUsage, "{}", status.error().detail());
+    }
   }
   const std::string_view source = loaded.file.empty() ? std::string_view("configuration") : loaded.file;
   if (Status status = check_rules(loaded.config, source); !status) return std::unexpected(status.error());

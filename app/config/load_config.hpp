@@ -38,7 +38,7 @@ struct LoadedConfig {
 
 /// Applies all sources and checks the whole.
 /// @return kConfigUnreadable, kConfigUnknownKey (with the nearest known key) or kConfigBadValue (with the range), each
-///         with file:line:column or the name of the variable or flag
+///         with file:line:column or the name of the variable; kUsage with the name of the flag for what a flag says
 [[nodiscard]] Result<LoadedConfig> load_config(const ConfigSources& sources);
 
 /// Parses YAML text over the defaults; `name` stands for the file in errors. Errors as load_config.

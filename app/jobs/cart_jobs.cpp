@@ -1,27 +1,36 @@
 #include "app/jobs/cart_jobs.hpp"
 
-#include <exception>
+#include <new>
 
 #include "platform/journal/archive.hpp"
+#include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {
 namespace {
+
+/// Libraries turn a refused allocation into exceptions of their own: the account knows.
+Fault why_it_failed() {
+  const memory::HeapAccount* const account = memory::allocation_context().account;
+  return account != nullptr && account->refused > 0 ? Fault::kOutOfMemory : Fault::kInternal;
+}
 
 template <typename Arguments, typename Work>
 std::size_t run(const JobRequest& request, std::span<std::byte> bytes, std::uint64_t& failed, Work work) noexcept {
   Arguments arguments;
   ENSURE(7101, unpack(request.bytes(), arguments));
-  using JobResult = decltype(work(arguments));
-  JobResult result;
+  ByteWriter writer(bytes);
   try {
-    result = work(arguments);
-  } catch (const std::exception&) {  // heap allowance used up, or a library's complaint about its input
+    const auto result = work(arguments);
+    writer(true, result);
+  } catch (const std::bad_alloc&) {
     ++failed;
-    result = JobResult{};
+    writer(false, Fault::kOutOfMemory);
+  } catch (...) {
+    ++failed;
+    writer(false, why_it_failed());
   }
-  const std::size_t size = pack(result, bytes);
-  ENSURE(7102, size > 0);
-  return size;
+  ENSURE(7102, writer.ok());
+  return writer.size();
 }
 
 }  // namespace
@@ -58,6 +67,11 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
                                   [&b](const DetectArguments& a) { return b.check_board(a); });
     case JobKind::kSummarize:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.summarize(); });
+    case JobKind::kForgetKnownFree:
+      return run<NoArguments>(request, result, failed_, [&b](const NoArguments& a) {
+        b.forget_known_free();
+        return a;
+      });
   }
   ENSURE(7103, false);
   return 0;
@@ -82,6 +96,7 @@ Duration virtual_duration(JobKind kind) {
     case JobKind::kValidate:
       return milliseconds(1500);
     case JobKind::kIntegrate:
+    case JobKind::kForgetKnownFree:
       return milliseconds(80);
     case JobKind::kNextSweepView:
       return milliseconds(100);

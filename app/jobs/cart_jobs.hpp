@@ -9,7 +9,8 @@ namespace firstlook {
 class CartJobs final : public JobExecutor {
  public:
   explicit CartJobs(Workbench& bench) : bench_(bench) {}
-  /// A job that runs out of its heap allowance gives the empty result of its kind: not found, not solved, not used.
+  /// Writes true and the result of the kind's type; or, when the job ran out of its heap allowance (kOutOfMemory) or
+  /// threw anything else (kInternal), false and that fault.
   std::size_t execute(const JobRequest& request, std::span<std::byte> result) noexcept override;
   [[nodiscard]] std::uint64_t failed() const { return failed_; }
 

@@ -5,6 +5,7 @@
 #include "algorithms/mapping/remaining.hpp"
 #include "algorithms/mapping/self_filter.hpp"
 #include "app/jobs/workbench.hpp"
+#include "platform/journal/journal.hpp"
 
 namespace firstlook {
 namespace {
@@ -20,7 +21,7 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   const LinkFrames frames = forward(arm_, arguments.frame.at_rad);
   const auto base_T_depth = frames.flange() * hand_eye_->flange_T_camera * facts_.camera_T_depth;
 
-  if (depth_.read(arguments.frame.frame, pixels)) {
+  if (depth_.read(arguments.frame.frame, pixels) && !is_frozen(arguments.frame.frame, result)) {
     const Capsules body = place(camera_body_.capsules, frames);
     render_self_depth(std::span<const Capsule>(body.data(), body.size()), kSelfPadding_m, base_T_depth, camera,
                       self_depth_.items());
@@ -46,6 +47,20 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
     note_view(arguments, result.gained);
   }
   return result;
+}
+
+/// A camera that hangs may go on sending the last picture with new stamps. A picture without any return proves nothing.
+bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
+  const std::span<const std::uint16_t> pixels = depth_pixels_.items();
+  const std::uint64_t hash = [&] {
+    Fnv1a sum;
+    sum.add(std::as_bytes(pixels));
+    return sum.value();
+  }();
+  const bool returns = std::any_of(pixels.begin(), pixels.end(), [](std::uint16_t z) { return z != 0; });
+  result.frozen = returns && last_picture_ && last_picture_->second == hash && last_picture_->first != frame.sequence;
+  last_picture_ = {frame.sequence, hash};
+  return result.frozen;
 }
 
 void Workbench::note_view(const IntegrateArguments& arguments, std::uint64_t gained) {

@@ -120,6 +120,7 @@ class Workbench {
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
+  [[nodiscard]] bool is_frozen(const hal::Frame& frame, IntegrateResult& result);
   void begin_mapping();
   void rebuild_free_space(double now_s);
   void note_view(const IntegrateArguments& arguments, std::uint64_t gained);
@@ -169,6 +170,7 @@ class Workbench {
   std::optional<SweepProgress> sweep_;
   std::vector<std::int8_t> swept_log_odds_;  ///< when the sweep ended
   PublishedSpace published_;
+  std::optional<std::pair<std::uint32_t, std::uint64_t>> last_picture_;  ///< of depth: frame and hash of its pixels
   double last_stamp_s_ = 0;
   bool sweeping_ = true;
   double expected_gain_ = 0;

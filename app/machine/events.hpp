@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <variant>
 
@@ -64,13 +65,13 @@ struct CommandRefused {
   }
 };
 
-/// SIGINT or SIGTERM, or the end of a virtual run's time.
+/// The program is to end: by SIGINT or SIGTERM, because its time is over, or because it cannot go on.
 struct ShutdownAsked {
   static constexpr std::uint16_t kKind = 21;
-  std::uint8_t none = 0;  // a value takes at least one byte
+  Fault cause = Fault::kProgramStopped;
   template <typename Archive>
   void fields(Archive& a) {
-    a(none);
+    a(cause);
   }
 };
 
@@ -81,11 +82,12 @@ struct TimerFired {
   MachineTimer timer = MachineTimer::kState;
 };
 
-/// A job is done; `result` of the kind's type is unpacked by the state that asked for it.
+/// A job is done; `result` of the kind's type is unpacked by the state that asked for it. One that failed has none.
 struct JobCompleted {
   JobKind kind = JobKind::kPlan;
   std::uint32_t number = 0;
   std::span<const std::byte> result;
+  std::optional<Fault> failed;
 };
 
 /// A frame together with the arm's joints at its stamp, made by the machine itself from arm reports around it.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "hal/api/cameras.hpp"
 #include "platform/core/fault_table.hpp"
@@ -26,7 +27,29 @@ enum class JobKind : std::uint16_t {
   kCertifyPath,
   kCheckBoard,
   kSummarize,
+  kForgetKnownFree,
 };
+inline constexpr JobKind kLastJobKind = JobKind::kForgetKnownFree;
+
+/// What people read: "choosing the next view".
+[[nodiscard]] constexpr std::string_view name_of(JobKind kind) {
+  constexpr std::array<std::string_view, static_cast<std::size_t>(kLastJobKind)> kNames = {
+      "choosing where to look for the board",
+      "choosing motions that tell the camera's link",
+      "planning a path",
+      "finding the board",
+      "choosing the next calibration view",
+      "solving the calibration",
+      "validating the calibration",
+      "integrating a depth frame",
+      "choosing the next view of the sweep",
+      "choosing the next view",
+      "certifying a path",
+      "checking the board",
+      "summing up what remains unknown",
+      "forgetting what was known free"};
+  return kNames[static_cast<std::size_t>(kind) - 1];
+}
 
 inline constexpr std::size_t kPathMax = 32;
 inline constexpr std::size_t kViewListMax = 64;
@@ -49,7 +72,7 @@ enum class MotionPhase : std::uint8_t {
   kMapping,            ///< calibrated camera, known free space of the map
 };
 
-struct NoArguments {      ///< kSolve, kValidate, kSummarize
+struct NoArguments {      ///< kSolve, kValidate, kSummarize, kForgetKnownFree; also the last one's result
   std::uint8_t none = 0;  // a value takes at least one byte
   template <typename Archive>
   void fields(Archive& a) {
@@ -188,9 +211,10 @@ struct IntegrateResult {
   std::uint64_t unknown = 0, free = 0, occupied = 0;  ///< voxels of the mapped zone
   std::uint64_t gained = 0;                           ///< unknown voxels of the zone that this frame made known
   bool at_view = false;                               ///< as asked
+  bool frozen = false;  ///< pixel for pixel the picture of the frame before: noise makes that impossible
   template <typename Archive>
   void fields(Archive& a) {
-    a(used, path_free, unknown, free, occupied, gained, at_view);
+    a(used, path_free, unknown, free, occupied, gained, at_view, frozen);
   }
 };
 

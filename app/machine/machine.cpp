@@ -34,8 +34,27 @@ void Machine::on_event(Instant now, const MachineEvent& event) {
     last_depth_ = now;
     pending_depth_ = frame->frame;
   }
+  if (supervise(event)) return;
   dispatch(event);
   if (std::holds_alternative<ArmReported>(event)) pose_pending_frames();
+}
+
+bool Machine::supervise(const MachineEvent& event) {
+  if (is_within(state_, StateId::kBoot)) return false;
+  const bool ended = state_ == StateId::kStopped || state_ == StateId::kFaulted;
+  if (ended || std::holds_alternative<ArmReported>(event)) return false;
+  if (now_ - arm_.stamp > seconds(kArmStale_s)) {
+    stop_for(Fault::kLinkLost);
+  } else if (const auto* done = std::get_if<JobCompleted>(&event);
+             done != nullptr && done->failed &&
+             (done->number == awaited_ || done->number == integrate_job_ || done->kind == JobKind::kForgetKnownFree)) {
+    show("a job failed: {}", name_of(done->kind));
+    stop_for(*done->failed);
+  } else {
+    return false;
+  }
+  run_transitions();
+  return true;
 }
 
 void Machine::dispatch(const MachineEvent& event) {
@@ -103,8 +122,9 @@ void Machine::conclude(Outcome outcome, std::optional<Fault> fault) {
 void Machine::stop_for(Fault fault) {
   sink_.stop_arm(now_);
   sink_.stop_recorded(now_, fault);
-  progress_.ending = {fault == Fault::kUnexpectedEvent ? Outcome::kFaulted : Outcome::kSafelyStopped, true, fault};
-  transition(fault == Fault::kUnexpectedEvent ? StateId::kFaulted : StateId::kStopped);
+  const bool internal = fault == Fault::kUnexpectedEvent || fault == Fault::kInternal;
+  progress_.ending = {internal ? Outcome::kFaulted : Outcome::kSafelyStopped, true, fault};
+  transition(internal ? StateId::kFaulted : StateId::kStopped);
 }
 
 void Machine::finish(const Ending& ending) {
@@ -246,11 +266,7 @@ Machine::Trip Machine::advance_trip(const MachineEvent& event) {
   if (const auto* refused = std::get_if<CommandRefused>(&event)) return interrupt_trip(refused->fault);
   if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kSupervise) {
     set_timer(MachineTimer::kSupervise, kSupervisePeriod_s);
-    if (now_ - arm_.stamp > seconds(kArmStale_s)) {
-      stop_for(Fault::kLinkLost);
-    } else if (map_on_the_way_ && now_ - last_depth_ > seconds(kDepthStale_s)) {
-      stop_for(Fault::kStreamStale);
-    }
+    if (map_on_the_way_ && now_ - last_depth_ > seconds(kDepthStale_s)) stop_for(Fault::kStreamStale);
     return Trip::kUnderWay;
   }
   if (const auto* posed = std::get_if<DepthPosed>(&event); posed && map_on_the_way_ && !integrating()) {
@@ -272,6 +288,7 @@ void Machine::start_look(bool depth, int count) {
   looking_ = true;
   look_open_ = false;
   look_depth_ = depth;
+  look_unposed_ = false;
   look_count_ = static_cast<std::size_t>(count);
   look_.clear();
   set_timer(MachineTimer::kSettle, settings_.settle_time_s);
@@ -282,13 +299,17 @@ bool Machine::advance_look(const MachineEvent& event) {
   if (!looking_) return false;
   if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kSettle) {
     if (look_open_) {
-      stop_for(Fault::kStreamStale);
+      stop_for(look_unposed_ && look_.empty() ? Fault::kClockWrong : Fault::kStreamStale);
       return false;
     }
     look_open_ = true;
     look_from_ = now_;
     set_timer(MachineTimer::kSettle, kFramesWithin_s);
     return false;
+  }
+  if (look_depth_ ? std::holds_alternative<DepthFrameArrived>(event)
+                  : std::holds_alternative<ColorFrameArrived>(event)) {
+    look_unposed_ = look_open_;
   }
   const PosedFrame* posed = nullptr;
   if (const auto* color = std::get_if<ColorPosed>(&event); color && !look_depth_) posed = &color->frame;
@@ -314,6 +335,10 @@ std::optional<IntegrateResult> Machine::integrate_result(const MachineEvent& eve
   integrate_job_ = 0;
   IntegrateResult result;
   ENSURE(7003, unpack(done->result, result));
+  if (result.frozen) {
+    stop_for(Fault::kStreamFrozen);
+    return std::nullopt;
+  }
   return result;
 }
 

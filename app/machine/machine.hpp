@@ -130,6 +130,8 @@ class Machine {
   [[nodiscard]] std::optional<IntegrateResult> integrate_result(const MachineEvent& event);
 
  private:
+  /// What holds in every state: a silent arm, a job that failed. True when it ended the job.
+  [[nodiscard]] bool supervise(const MachineEvent& event);
   void dispatch(const MachineEvent& event);
   void run_transitions();
   void enter_path_to(StateId target);
@@ -174,6 +176,7 @@ class Machine {
   Instant last_way_frame_{};
 
   bool looking_ = false, look_open_ = false, look_depth_ = false;
+  bool look_unposed_ = false;  ///< frames came, but none whose pose is known
   std::size_t look_count_ = 0;
   Instant look_from_{};
   FixedVector<PosedFrame, 8> look_;

@@ -12,9 +12,10 @@ namespace {
 using S = StateId;
 using enum StateId;
 
-constexpr std::array kFromBoot = {Transition{"all devices report", kReady},
-                                  Transition{"a device is missing", kFaulted}};
-constexpr std::array kFromReady = {Transition{"Play or start button", kLocateBoard}, Transition{"shutdown", kStopped}};
+constexpr std::array kFromBoot = {Transition{"all devices report", kReady}, Transition{"a device is missing", kFaulted},
+                                  Transition{"shutdown", kStopped}};
+constexpr std::array kFromReady = {Transition{"Play or start button", kLocateBoard},
+                                   Transition{"link lost, protective stop, shutdown", kStopped}};
 constexpr std::array kFromRunning = {Transition{"pause", kPaused},
                                      Transition{"stop, link lost, stale stream", kStopped},
                                      Transition{"unexpected event", kFaulted}, Transition{"cannot go on", kPark}};

@@ -82,11 +82,11 @@ Status write_files(const std::string& folder, const std::vector<NamedFile>& file
 
 }  // namespace
 
-Status prepare_run_folder(const std::string& folder) {
+Status check_run_folder(const std::string& folder) {
   const Result<bool> empty = folder_is_empty(folder);
   if (!empty) return std::unexpected(empty.error());
   if (!*empty) return failure(Fault::kOutputNotEmpty, "{}", folder);
-  return make_directories(folder);
+  return {};
 }
 
 std::string views_csv(const RunRecord& record) {

@@ -18,9 +18,9 @@ struct MapFiles {
   std::vector<AxisBox> occupied;  ///< merge_occupied of the map, base frame: becomes ros/*.scene, once for each frame
 };
 
-/// Makes the folder of a run before the job starts, so that a full or forbidden place is found out early.
-/// @return kOutputNotEmpty when it exists and is not empty, kDiskWrite when it cannot be made
-[[nodiscard]] Status prepare_run_folder(const std::string& folder);
+/// Whether a run may write there; makes nothing, so that a run that does not start leaves nothing behind.
+/// @return kOutputNotEmpty when it exists and is not empty, kDiskWrite when it is no folder or cannot be read
+[[nodiscard]] Status check_run_folder(const std::string& folder);
 
 /// Writes result.json, views.csv, report.html and, as far as the run got, hand_eye.yaml, camera_info.yaml, the map's
 /// files and ros/, each whole or not at all; result.json last, so that its presence means that the others are there.

@@ -1,6 +1,7 @@
 #include "app/shell/cart.hpp"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "algorithms/mapping/moveit_scene.hpp"
 #include "algorithms/mapping/octree_writer.hpp"
@@ -9,6 +10,7 @@
 #include "app/config/load_config.hpp"
 #include "app/shell/event_codec.hpp"
 #include "app/shell/job_settings.hpp"
+#include "platform/linux/files.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/wakeup.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -36,17 +38,26 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   auto bench = Workbench::make(cart->config_, facts, devices.color, devices.depth, *cart->workers_);
   if (!bench) return std::unexpected(bench.error());
   cart->bench_ = std::move(*bench);
+  const std::string folder = std::filesystem::path(options.journal_path).parent_path().string();
+  if (const Status made = make_directories(folder); !made) return std::unexpected(made.error());
   auto journal =
       JournalWriter::create_file(options.journal_path, {version_text(), journal_config(cart->config_, options.scope)});
   if (!journal) return std::unexpected(journal.error());
   cart->journal_ = std::move(*journal);
+  // The clock starts when all memory is taken: the devices' time is the loop's.
+  if (options.real_time) {
+    cart->clock_ = std::make_unique<RealClock>();
+  } else {
+    cart->clock_ = std::make_unique<VirtualClock>();
+  }
   cart->jobs_ = std::make_unique<CartJobs>(*cart->bench_);
   cart->runner_ = std::make_unique<JobRunner>(*cart->jobs_, *cart->clock_,
                                               options.real_time ? JobMode::kThreaded : JobMode::kVirtual);
   cart->loop_.reset(new EventLoop(*cart->clock_, cart->journal_.get(), *cart, cart->timers_, *cart->runner_));
   cart->arm_source_.emplace(devices.arm, cart->bench_->arm(), cart->bench_->published());
-  EventSource* const sources[] = {&cart->host_,         &*cart->arm_source_,    &cart->color_source_,
-                                  &cart->depth_source_, &cart->pendant_source_, &cart->panel_source_};
+  // The arm first: whatever else comes in the same turn finds its newest report.
+  EventSource* const sources[] = {&*cart->arm_source_,    &cart->color_source_, &cart->depth_source_,
+                                  &cart->pendant_source_, &cart->panel_source_, &cart->host_};
   for (EventSource* source : sources) cart->loop_->add_source(*source);
   cart->loop_->set_watchdog(&cart->watchdog_);
   cart->machine_.emplace(machine_settings(cart->config_, options.scope), cart->decisions_);
@@ -65,13 +76,7 @@ Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& 
       panel_source_(devices.panel, OperatorDevice::kPanel),
       decisions_(*this, this),
       started_(utc_date_text()),
-      wall_start_s_(static_cast<double>(monotonic_ns()) * 1e-9) {
-  if (options.real_time) {
-    clock_ = std::make_unique<RealClock>();
-  } else {
-    clock_ = std::make_unique<VirtualClock>();
-  }
-}
+      wall_start_s_(static_cast<double>(monotonic_ns()) * 1e-9) {}
 
 Cart::~Cart() = default;
 
@@ -84,6 +89,8 @@ Status Cart::run() {
   if (loop_allocations_ > 0) memory::print_first_loop_allocation(2);
   const Instant now = clock_->now();
   if (!phases_.empty()) phases_.back().end = now;
+  loop_.reset();
+  runner_.reset();  // waits for a job that still works on what the record is made of
   if (const Status closed = journal_->close(now); !closed) return closed;
   return status;
 }
@@ -95,7 +102,7 @@ void Cart::on_event(const Event& event) {
   if (!machine_event) return;  // the loop's own faults are in the journal
   if (const auto* done = std::get_if<JobCompleted>(&*machine_event)) {
     bench_->published().take();
-    if (done->number == awaited_job_) {
+    if (awaited_job_ != 0 && done->number == awaited_job_) {
       stall_s_ += (event.time - job_started_).seconds();
       awaited_job_ = 0;
     }
@@ -111,8 +118,12 @@ void Cart::watch_arm(const ArmReported& report) {
 }
 
 void Cart::end_of_turn(Instant now) {
-  if (stop_signal_received() || (!options_.real_time && now.seconds() > options_.virtual_time_max_s)) {
-    host_.ask_shutdown();
+  if (stop_signal_received()) host_.ask_shutdown(Fault::kProgramStopped);
+  if (!options_.real_time) {
+    if (machine_->state() == StateId::kReady && now.seconds() > options_.virtual_wait_max_s) {
+      host_.ask_shutdown(Fault::kNotStarted);
+    }
+    if (now.seconds() > options_.virtual_time_max_s) host_.ask_shutdown(Fault::kTookTooLong);
   }
   if (ended_) loop_->stop();
 }
@@ -139,18 +150,22 @@ void Cart::move_arm(Instant now, const hal::Segment& segment) {
 void Cart::stop_arm(Instant now) { devices_.arm.stop(now); }
 
 void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<const std::byte> arguments) {
+  if (kind != JobKind::kIntegrate) {
+    awaited_job_ = number;
+    job_started_ = now;
+  }
+  submit(kind, number, arguments, now);
+}
+
+void Cart::submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now) {
   request_.kind = static_cast<std::uint16_t>(kind);
   request_.number = number;
   request_.on_map_strand = true;  // every job reads or writes the workbench
   request_.virtual_duration = virtual_duration(kind);
   request_.size = static_cast<std::uint32_t>(arguments.size());
   std::copy(arguments.begin(), arguments.end(), request_.arguments.begin());
-  if (kind != JobKind::kIntegrate) {
-    awaited_job_ = number;
-    job_started_ = now;
-  }
-  // The machine has one awaited job and one integration at a time: the queue of eight cannot be full.
-  ENSURE(7221, runner_->submit(request_, now).has_value());
+  // The machine waits for two jobs at most, but in real time those that a pause left behind may still run.
+  if (!runner_->submit(request_, now)) host_.ask_shutdown(Fault::kQueueFull);
 }
 
 void Cart::set_timer(Instant, MachineTimer timer, Instant due) { timers_.set(static_cast<std::uint32_t>(timer), due); }
@@ -171,7 +186,11 @@ void Cart::show(Instant now, std::string_view text) {
 
 void Cart::light(Instant, hal::Light light) { devices_.panel.light(light); }
 
-void Cart::forget_known_free(Instant) { bench_->forget_known_free(); }
+/// A job like the others, because one that works on the map may be running. The machine does not wait for it.
+void Cart::forget_known_free(Instant now) {
+  constexpr std::array<std::byte, 1> kNone{};
+  submit(JobKind::kForgetKnownFree, 0, kNone, now);
+}
 
 void Cart::stop_recorded(Instant now, Fault cause) {
   if (!stops_.full()) stops_.push_back({now, cause});

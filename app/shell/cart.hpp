@@ -30,7 +30,9 @@ struct CartOptions {
   RunScope scope = RunScope::kEverything;
   bool real_time = false;
   std::string journal_path;
-  double virtual_time_max_s = 3 * 3600;  ///< a job in virtual time that takes longer is stopped
+  // In virtual time nobody is there to lose patience.
+  double virtual_time_max_s = 3 * 3600;  ///< a job that takes longer is stopped
+  double virtual_wait_max_s = 600;       ///< for Play
 };
 
 /// A phase of the job as it happened.
@@ -53,7 +55,8 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
                                                           Narrator& narrator);
   ~Cart() override;
 
-  /// Boots, seals the memory, runs the job to its end. Error: that of the loop (nothing is due any more).
+  /// Boots, seals the memory, runs the job to its end. Errors: that of the loop (nothing is due any more), kDiskWrite
+  /// when the journal could not be written to its end; the job itself went on.
   [[nodiscard]] Status run();
 
   /// What was recorded; after run().
@@ -85,6 +88,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   void end_of_turn(Instant now) override;
 
   void watch_arm(const ArmReported& report);
+  void submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now);
 
   Config config_;
   CartOptions options_;

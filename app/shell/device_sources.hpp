@@ -76,8 +76,12 @@ class HostSource final : public EventSource {
  public:
   void refused(Fault fault) { refused_ = fault; }
   [[nodiscard]] Instant next_due() const override { return refused_ || shutdown_ ? Instant{} : kNever; }
-  /// Asks for a shutdown once, at the next turn.
-  void ask_shutdown() { shutdown_ = !shutdown_sent_; }
+  /// Asks for a shutdown once, at the next turn; the first cause counts.
+  void ask_shutdown(Fault cause) {
+    if (shutdown_ || shutdown_sent_) return;
+    shutdown_ = true;
+    cause_ = cause;
+  }
   [[nodiscard]] Status collect(Instant now, EventQueue& queue) override {
     if (refused_) {
       const Fault fault = *refused_;
@@ -87,13 +91,14 @@ class HostSource final : public EventSource {
     if (shutdown_) {
       shutdown_ = false;
       shutdown_sent_ = true;
-      return push_event(queue, now, ShutdownAsked{});
+      return push_event(queue, now, ShutdownAsked{cause_});
     }
     return {};
   }
 
  private:
   std::optional<Fault> refused_;
+  Fault cause_ = Fault::kProgramStopped;
   bool shutdown_ = false;
   bool shutdown_sent_ = false;
 };

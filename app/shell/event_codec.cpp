@@ -26,8 +26,16 @@ std::optional<MachineEvent> decode_event(std::uint16_t kind, std::span<const std
       std::uint16_t job = 0;
       std::uint32_t number = 0;
       reader(job, number);
-      if (!reader.ok()) return std::nullopt;
-      return JobCompleted{static_cast<JobKind>(job), number, bytes.subspan(kJobHeadBytes)};
+      Fault failed = Fault::kInternal;
+      bool done = false;
+      reader(done);
+      if (!done) reader(failed);
+      if (!reader.ok() || job < static_cast<std::uint16_t>(JobKind::kLocateViews) ||
+          job > static_cast<std::uint16_t>(kLastJobKind)) {
+        return std::nullopt;
+      }
+      if (!done) return JobCompleted{static_cast<JobKind>(job), number, {}, failed};
+      return JobCompleted{static_cast<JobKind>(job), number, bytes.subspan(kJobHeadBytes + 1), std::nullopt};
     }
     case ArmReported::kKind:
       return as<ArmReported>(bytes);

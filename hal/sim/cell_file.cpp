@@ -449,7 +449,10 @@ Result<Scene> load_cell(std::string_view name_or_file, std::uint64_t seed) {
   std::ifstream file(path);
   std::stringstream text;
   if (!file || !(text << file.rdbuf())) {
-    return failure(Fault::kDataMissing, "{}: neither a built-in cell nor a file that can be read", path);
+    std::string names;
+    for (const BuiltInCell& cell : built_in_cells()) names += std::string(cell.name) + ", ";
+    return failure(Fault::kDataMissing, "{}: neither a file that can be read nor a built-in cell ({}random:SEED)", path,
+                   names);
   }
   return parse_cell(text.str(), path, seed);
 }

@@ -46,6 +46,11 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kProgramStopped,         5005, kStop,     "stopped by the operator",              "Press start for a new job.") \
   X(kFrameGone,              5006, kNotice,   "a frame is no longer held by its device", "The computer is too slow for the stream.") \
   X(kMoveRefused,            5007, kStop,     "the controller refused a move",        "Check the joint limits and speeds of the configuration against the controller's.") \
+  X(kNotStarted,             5008, kRefusal,  "nobody pressed Play",                  "Press Play on the pendant within 10 minutes of the start, then the start button where one is configured.") \
+  X(kPausedTooLong,          5009, kStop,     "paused for longer than an hour",       "Press start for a new job.") \
+  X(kClockWrong,             5010, kStop,     "a camera's time stamps do not fit the arm's", "Set the camera's clock and latency: the arm's pose at the time of a frame must be known.") \
+  X(kStreamFrozen,           5011, kStop,     "a camera repeats one picture",         "Restart the camera, check its cable and power, then press start again.") \
+  X(kTookTooLong,            5012, kStop,     "the job took longer than three hours", "See in the report which phase took so long.") \
   X(kConfigUnreadable,       6001, kRefusal,  "configuration not readable",           "Correct the file; `firstlook config --defaults` shows every key.") \
   X(kConfigUnknownKey,       6002, kRefusal,  "unknown configuration key",            "Correct the key; `firstlook config --defaults` shows every key.") \
   X(kConfigBadValue,         6003, kRefusal,  "configuration value out of range",     "Correct the value; `firstlook config --defaults` shows the defaults.") \

@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,8 @@ class ScriptedWorld : public DecisionSink {
   bool consent = true;
   bool arm_reports = true;
   bool depth_frames = true;
+  Duration frame_age = milliseconds(4);  ///< of a frame's stamp when it comes; negative: its clock runs ahead
+  std::optional<JobKind> failing;        ///< jobs of this kind run out of memory
   hal::ArmSafety safety = hal::ArmSafety::kNormal;
   double guardian_margin_m = 0.1;
 
@@ -103,9 +106,9 @@ class ScriptedWorld : public DecisionSink {
     }
     move_on();
     if (arm_reports) machine.on_event(now, report());
-    if (++ticks_ % 8 == 0) machine.on_event(now, ColorFrameArrived{{now - milliseconds(4), ++frames_, frames_ % 32}});
+    if (++ticks_ % 8 == 0) machine.on_event(now, ColorFrameArrived{{now - frame_age, ++frames_, frames_ % 32}});
     if (ticks_ % 4 == 0 && depth_frames) {
-      machine.on_event(now, DepthFrameArrived{{now - milliseconds(4), ++frames_, frames_ % 32}});
+      machine.on_event(now, DepthFrameArrived{{now - frame_age, ++frames_, frames_ % 32}});
     }
     answer_jobs();
     fire_timers();
@@ -175,7 +178,7 @@ class ScriptedWorld : public DecisionSink {
   void answer(const Job& job, const T& result) {
     std::vector<std::byte> bytes(16384);
     const std::size_t size = pack(result, std::span<std::byte>(bytes));
-    machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size)});
+    machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size), {}});
   }
   ViewList views_around(const JointVector& at, int count) const {
     ViewList list;
@@ -190,6 +193,10 @@ class ScriptedWorld : public DecisionSink {
     while (!jobs_.empty() && !ended) {
       const Job job = jobs_.front();
       jobs_.pop_front();
+      if (failing == job.kind) {
+        machine.on_event(now, JobCompleted{job.kind, job.number, {}, Fault::kOutOfMemory});
+        continue;
+      }
       switch (job.kind) {
         case JobKind::kLocateViews:
           answer(job, views_around(position_, locate_views));
@@ -239,6 +246,8 @@ class ScriptedWorld : public DecisionSink {
           break;
         case JobKind::kSummarize:
           answer(job, SummarizeResult{});
+          break;
+        case JobKind::kForgetKnownFree:  // the shell's own
           break;
       }
     }

@@ -24,6 +24,10 @@ Handled on_boot(Machine& m, const MachineEvent& event) {
     }
     return Handled::kYes;
   }
+  if (const auto* asked = std::get_if<ShutdownAsked>(&event)) {
+    m.stop_for(asked->cause);
+    return Handled::kYes;
+  }
   if (m.arm_known() && m.color_seen() && m.depth_seen()) {
     m.cancel_timer(MachineTimer::kState);
     m.transition(StateId::kReady);

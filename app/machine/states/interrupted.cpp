@@ -21,8 +21,7 @@ void enter_paused(Machine& m) {
 Handled on_paused(Machine& m, const MachineEvent& event) {
   Progress& p = m.progress();
   if (const auto* report = std::get_if<ArmReported>(&event)) {
-    const hal::ArmSafety safety = report->state.safety;
-    if (safety != hal::ArmSafety::kNormal && safety != hal::ArmSafety::kReduced) {
+    if (!may_move(report->state.safety)) {
       m.stop_for(Fault::kProtectiveStop);
     } else if (report->state.program_running && !report->state.moving) {
       m.cancel_timer(MachineTimer::kState);
@@ -35,9 +34,12 @@ Handled on_paused(Machine& m, const MachineEvent& event) {
     if (key->action == hal::OperatorAction::kStop) m.stop_for(Fault::kProgramStopped);
     return Handled::kYes;
   }
-  const auto* timer = std::get_if<TimerFired>(&event);
-  if (std::holds_alternative<ShutdownAsked>(event) || (timer && timer->timer == MachineTimer::kState)) {
-    m.stop_for(Fault::kProgramStopped);
+  if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kState) {
+    m.stop_for(Fault::kPausedTooLong);
+    return Handled::kYes;
+  }
+  if (const auto* asked = std::get_if<ShutdownAsked>(&event)) {
+    m.stop_for(asked->cause);
     return Handled::kYes;
   }
   return std::holds_alternative<CommandRefused>(event) ? Handled::kYes : Handled::kNo;

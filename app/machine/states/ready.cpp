@@ -25,8 +25,12 @@ Handled on_ready(Machine& m, const MachineEvent& event) {
     }
     return Handled::kYes;
   }
-  if (std::holds_alternative<ShutdownAsked>(event)) {
-    m.stop_for(Fault::kProgramStopped);
+  if (const auto* asked = std::get_if<ShutdownAsked>(&event)) {
+    m.stop_for(asked->cause);
+    return Handled::kYes;
+  }
+  if (const auto* report = std::get_if<ArmReported>(&event); report != nullptr && !may_move(report->state.safety)) {
+    m.stop_for(Fault::kProtectiveStop);
     return Handled::kYes;
   }
   if (std::holds_alternative<ArmReported>(event) && m.settings().start_source == StartSource::kPendant && p.played &&

@@ -5,8 +5,7 @@ namespace firstlook::states {
 
 void enter_running(Machine& m) {
   m.light(hal::Light::kAmber);
-  const hal::ArmSafety safety = m.arm().safety;
-  if (safety != hal::ArmSafety::kNormal && safety != hal::ArmSafety::kReduced) m.stop_for(Fault::kProtectiveStop);
+  if (!may_move(m.arm().safety)) m.stop_for(Fault::kProtectiveStop);
 }
 
 namespace {
@@ -18,8 +17,7 @@ void pause(Machine& m) {
 
 Handled on_running(Machine& m, const MachineEvent& event) {
   if (const auto* report = std::get_if<ArmReported>(&event)) {
-    const hal::ArmSafety safety = report->state.safety;
-    if (safety != hal::ArmSafety::kNormal && safety != hal::ArmSafety::kReduced) {
+    if (!may_move(report->state.safety)) {
       m.stop_for(Fault::kProtectiveStop);
     } else if (!report->state.program_running) {
       pause(m);
@@ -31,13 +29,15 @@ Handled on_running(Machine& m, const MachineEvent& event) {
     if (key->action == hal::OperatorAction::kPause) pause(m);
     return Handled::kYes;
   }
-  if (std::holds_alternative<ShutdownAsked>(event)) {
-    m.stop_for(Fault::kProgramStopped);
+  if (const auto* asked = std::get_if<ShutdownAsked>(&event)) {
+    m.stop_for(asked->cause);
     return Handled::kYes;
   }
   // A refusal that comes after its trip was withdrawn.
   return std::holds_alternative<CommandRefused>(event) ? Handled::kYes : Handled::kNo;
 }
+
+bool may_move(hal::ArmSafety safety) { return safety == hal::ArmSafety::kNormal || safety == hal::ArmSafety::kReduced; }
 
 MotionPhase phase_of(Machine& m) {
   return m.progress().calibration_accepted ? MotionPhase::kMapping : MotionPhase::kBeforeCalibration;

@@ -43,6 +43,8 @@ void enter_stopped(Machine& m);
 void enter_faulted(Machine& m);
 Handled on_ended(Machine& m, const MachineEvent& event);
 
+/// False from a protective or emergency stop until a person has cleared it.
+[[nodiscard]] bool may_move(hal::ArmSafety safety);
 /// Asks for a path from here to `target`.
 void plan_to(Machine& m, const JointVector& target, MotionPhase phase);
 /// The body and space that motions are certified for now.

@@ -29,7 +29,7 @@ Config all_changed() {
   Config c;
   c.cell = "cells/my cell \"A\": #1.yaml";
   c.seed = 9007199254740992;
-  c.workers = 7;
+  c.workers = 4;
   c.start_source = "panel";
   c.arm = {"ur10e", 0.1 + 0.2, 1.0 / 3.0, 2.5};
   c.safe_zone = {0.7, 0.9};
@@ -177,6 +177,7 @@ TEST_CASE("flag beats environment beats file beats default", "[config]") {
   sources.environment = {};
   sources.flags = {{"seed", "-1", "--seed"}};
   CHECK_THAT(std::string(load_config(sources).error().detail()), Contains("--seed: seed is -1; must be between 0"));
+  CHECK(load_config(sources).error().fault == Fault::kUsage);
   sources.flags = {};
   sources.file = "/nowhere/at/all.yaml";
   CHECK(load_config(sources).error().fault == Fault::kConfigUnreadable);
@@ -193,8 +194,7 @@ TEST_CASE("the nearest name", "[config]") {
 }
 
 TEST_CASE("the program's version is the build's", "[config]") {
-  const auto root = std::filesystem::path(__FILE__).parent_path() / ".." / ".." / "..";
-  std::ifstream file(root / "CMakeLists.txt");
+  std::ifstream file(std::filesystem::path(FIRSTLOOK_SOURCE_DIR) / "CMakeLists.txt");
   const std::string cmake((std::istreambuf_iterator<char>(file)), {});
   CHECK_THAT(cmake, Contains("project(firstlook VERSION " + version_text() + " "));
 }

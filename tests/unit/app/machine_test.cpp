@@ -153,15 +153,93 @@ TEST_CASE("every stop ends motion at once and needs a person", "[machine]") {
   CHECK(world.segments_after_stop == 0);
 }
 
-TEST_CASE("a silent arm while moving is a lost link", "[machine]") {
+TEST_CASE("a silent arm is a lost link in every state, at once", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  const StateId state = GENERATE(StateId::kReady, StateId::kLocateBoard, StateId::kIdentifyLink, StateId::kCollect,
+                                 StateId::kSweep, StateId::kMove, StateId::kLook, StateId::kPark);
+  if (state != StateId::kReady) world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(state));
+  world.tick();
+  world.arm_reports = false;
+  REQUIRE(world.run_to_end(0.3));
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == Fault::kLinkLost);
+  CHECK(world.stops.size() == 1);
+}
+
+TEST_CASE("a paused arm that falls silent, and a pause that never ends", "[machine]") {
   ScriptedWorld world;
   world.run_until(StateId::kReady);
   world.press(OperatorAction::kPlay);
-  REQUIRE(world.run_until(StateId::kMove));
-  world.tick();
-  world.arm_reports = false;
-  REQUIRE(world.run_to_end(1));
-  CHECK(world.ending.fault == Fault::kLinkLost);
+  REQUIRE(world.run_until(StateId::kSweep));
+  world.consent = false;
+  REQUIRE(world.run_until(StateId::kPaused));
+  SECTION("silence") {
+    world.arm_reports = false;
+    REQUIRE(world.run_to_end(0.3));
+    CHECK(world.ending.fault == Fault::kLinkLost);
+  }
+  SECTION("an hour") {
+    REQUIRE(world.run_to_end(3601));
+    CHECK(world.ending.fault == Fault::kPausedTooLong);
+  }
+}
+
+TEST_CASE("a protective stop before Play is named, not waited for", "[machine]") {
+  ScriptedWorld world;
+  world.run_until(StateId::kReady);
+  world.safety = hal::ArmSafety::kEmergencyStop;
+  REQUIRE(world.run_to_end(0.1));
+  CHECK(world.ending.fault == Fault::kProtectiveStop);
+}
+
+TEST_CASE("a shutdown ends the job in every state, with its cause", "[machine]") {
+  ScriptedWorld world;
+  const StateId state = GENERATE(StateId::kBoot, StateId::kReady, StateId::kSweep);
+  world.devices = state != StateId::kBoot;
+  REQUIRE(world.run_until(state == StateId::kBoot ? StateId::kBoot : StateId::kReady));
+  if (state == StateId::kSweep) world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(state));
+  world.machine.on_event(world.now, ShutdownAsked{Fault::kNotStarted});
+  REQUIRE(world.ended);
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == Fault::kNotStarted);
+}
+
+TEST_CASE("a job that fails ends the run safely with its fault", "[machine]") {
+  ScriptedWorld world;
+  world.failing = GENERATE(JobKind::kLocateViews, JobKind::kIdentifyMotions, JobKind::kPlan, JobKind::kDetectBoard,
+                           JobKind::kNextCalibrationView, JobKind::kSolve, JobKind::kValidate, JobKind::kIntegrate,
+                           JobKind::kNextSweepView, JobKind::kNextView, JobKind::kCertifyPath, JobKind::kCheckBoard,
+                           JobKind::kSummarize);
+  INFO(name_of(*world.failing));
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end(600));
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == Fault::kOutOfMemory);
+  REQUIRE(world.shown.size() >= 2);
+  CHECK(world.shown[world.shown.size() - 2].find(name_of(*world.failing)) != std::string::npos);
+}
+
+TEST_CASE("frames whose time the arm does not know are not a camera that stopped", "[machine]") {
+  ScriptedWorld world;
+  world.frame_age = GENERATE(milliseconds(-300), milliseconds(5000));
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end(20));
+  CHECK(world.ending.fault == Fault::kClockWrong);
+}
+
+TEST_CASE("a frozen depth camera stops the job", "[machine]") {
+  ScriptedWorld world;
+  world.integrated.frozen = true;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == Fault::kStreamFrozen);
 }
 
 TEST_CASE("a look at a camera that delivers nothing ends with a stale stream", "[machine]") {

@@ -125,7 +125,7 @@ TEST_CASE("only wall differs between two runs of one record", "[report]") {
 TEST_CASE("a finished run leaves every file", "[report]") {
   const auto folder = fresh_folder("whole");
   const RunRecord record = sample_record();
-  REQUIRE(prepare_run_folder(folder.string()));
+  REQUIRE(check_run_folder(folder.string()));
   REQUIRE(write_run_files(folder.string(), record, sample_map()));
   for (const char* name : {"result.json", "views.csv", "report.html", "hand_eye.yaml", "camera_info.yaml",
                            "collision_map.bt", "map.ot", "map.ply", "ros/easy_handeye.yaml", "ros/easy_handeye2.calib",
@@ -139,14 +139,14 @@ TEST_CASE("a finished run leaves every file", "[report]") {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     CHECK(entry.path().string().find("tmp") == folder.string().find("tmp"));  // nothing half-written stays
   }
-  CHECK(prepare_run_folder(folder.string()).error().fault == Fault::kOutputNotEmpty);
+  CHECK(check_run_folder(folder.string()).error().fault == Fault::kOutputNotEmpty);
   std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("a folder that cannot be written is an error with its name", "[report]") {
   const auto file = fresh_folder("file");
   std::ofstream(file) << "not a folder";
-  CHECK_FALSE(prepare_run_folder(file.string()));
+  CHECK_FALSE(check_run_folder(file.string()));
   const Status status = write_run_files((file / "run").string(), sample_record(), sample_map());
   REQUIRE_FALSE(status);
   CHECK(status.error().fault == Fault::kDiskWrite);

@@ -1,0 +1,163 @@
+/// What goes wrong in a cell, and how the job ends then: outcome, exit code, reason, and never a contact.
+#include <csignal>
+
+#include "tests/support/job_run.hpp"
+
+namespace firstlook {
+using test::check_safe;
+using test::JobFolder;
+using test::Json;
+using test::ProgramResult;
+
+namespace {
+
+struct Expected {
+  int exit_code;
+  const char* outcome;
+  const char* code;  ///< the reason begins with it; empty for a job that is done
+};
+constexpr Expected kDone{0, "done", ""};
+Expected stopped(const char* code) { return {6, "safely_stopped", code}; }
+Expected rejected(const char* code) { return {5, "calibration_rejected", code}; }
+
+bool begins_with(const Json& text, const std::string& begin) { return text.get<std::string>().starts_with(begin); }
+
+/// Runs the job with these faults; a short exploration is enough to come to its end.
+Json run_with(const std::string& faults, const Expected& expected, const std::vector<std::string>& more = {}) {
+  const JobFolder folder;
+  folder.write("short.yaml", "explore: {views_max: 2}\n");
+  std::vector<std::string> words = {"--config", "short.yaml", "--faults", faults};
+  words.insert(words.end(), more.begin(), more.end());
+  const ProgramResult run = folder.run_job("run", words);
+  INFO(faults << "\n" << run.err);
+  CHECK(run.exit_code == expected.exit_code);
+  const Json result = folder.read_json("run/result.json");
+  CHECK(result["outcome"] == expected.outcome);
+  CHECK(begins_with(result["reason"], expected.code));
+  check_safe(result);
+  CHECK(folder.run({"replay", "run/journal.flj"}).exit_code == 0);
+  return result;
+}
+
+double phase_start_s(const Json& result, const std::string& name) {
+  for (const Json& phase : result["phases"]) {
+    if (phase["name"] == name) return phase["start_s"];
+  }
+  return -1;
+}
+
+/// When the sweep of this job begins: where a run of the calibration alone leaves off. The sweep takes longer than the
+/// 20 s at most that the tests add to it.
+double sweep_start_s() {
+  static const double start_s = [] {
+    const JobFolder folder;
+    REQUIRE(folder.run_job("run", {"--only", "calibrate"}).exit_code == 0);
+    return phase_start_s(folder.read_json("run/result.json"), "Conclude");
+  }();
+  return start_s;
+}
+std::string in_sweep(const std::string& fault, double after_s) {
+  return fault + "=" + std::to_string(sweep_start_s() + after_s);
+}
+
+/// The job stops once, at a time within 0.2 s after the fault, for its reason.
+void check_stop(const Json& result, double at_s) {
+  REQUIRE(result["safety"]["stops"].size() == 1);
+  const Json& stop = result["safety"]["stops"][0];
+  CHECK(stop["cause"] == result["reason"]);
+  CHECK(stop["time_s"].get<double>() == Approx(at_s).margin(0.2));
+  CHECK(result["phases"].back()["name"] == "Stopped");
+}
+
+}  // namespace
+
+TEST_CASE("a person, the robot or the network stops the job at once", "[scenario]") {
+  check_stop(run_with("operator.stop_at=20", stopped("E5005")), 20);
+  check_stop(run_with("arm.protective_stop_at=20", stopped("E5004")), 20);
+  check_stop(run_with("arm.emergency_stop_at=20", stopped("E5004")), 20);
+  check_stop(run_with("arm.emergency_stop_at=0.2", stopped("E5004")), 0.2);
+}
+
+TEST_CASE("a lost link is one, whether the arm moves, waits or has not begun", "[scenario]") {
+  check_stop(run_with("link.lost_at=0.3", stopped("E5002")), 0.3);
+  check_stop(run_with("link.lost_at=6.9", stopped("E5002")), 6.9);
+  check_stop(run_with("link.lost_at=20", stopped("E5002")), 20);
+}
+
+TEST_CASE("a stop or a silent depth camera while mapping", "[scenario]") {
+  check_stop(run_with(in_sweep("link.lost_at", 15), stopped("E5002")), sweep_start_s() + 15);
+  check_stop(run_with(in_sweep("arm.emergency_stop_at", 17), stopped("E5004")), sweep_start_s() + 17);
+  const Json stalled = run_with(in_sweep("depth.stall_at", 16), stopped("E5003"));
+  CHECK(stalled["safety"]["stops"].size() == 1);
+  CHECK(stalled["safety"]["stops"][0]["time_s"].get<double>() < sweep_start_s() + 20);
+}
+
+TEST_CASE("a pause is waited for, but not for ever", "[scenario]") {
+  const Json resumed = run_with("operator.pause_at=20:5", kDone);
+  CHECK(phase_start_s(resumed, "Paused") == Approx(20).margin(0.1));
+  const Json given_up = run_with("operator.pause_at=20", stopped("E5009"));
+  CHECK(given_up["safety"]["stops"][0]["time_s"].get<double>() == Approx(3620).margin(1));
+}
+
+TEST_CASE("after a long pause the surroundings are looked at again", "[scenario]") {
+  const Json result = run_with(in_sweep("operator.pause_at", 20) + ":70", kDone);
+  CHECK(phase_start_s(result, "Paused") == Approx(sweep_start_s() + 20).margin(0.1));
+}
+
+TEST_CASE("nobody presses Play: the job does not wait for ever", "[scenario]") {
+  const Json result = run_with("operator.play_at=never", stopped("E5008"));
+  CHECK(result["hand_eye"].is_null());
+  CHECK(phase_start_s(result, "LocateBoard") == -1);
+}
+
+TEST_CASE("a board that is not there, a camera that is not on the arm", "[scenario]") {
+  CHECK(run_with("board.absent=1", stopped("E2005"))["hand_eye"].is_null());
+  CHECK(run_with("camera.fixed=1", rejected("E2006"))["hand_eye"].is_null());
+}
+
+TEST_CASE("a board that moves rejects the calibration, or the map", "[scenario]") {
+  const Json early = run_with("board.move_at=" + std::to_string(0.5 * sweep_start_s()), rejected("E2007"));
+  CHECK(early["hand_eye"]["verdict"] == "rejected");
+  CHECK(early["mapping"].is_null());
+  run_with(in_sweep("board.move_at", 10), stopped("E2008"));
+}
+
+TEST_CASE("cameras that were never there, or stop, or hang, or have a wrong clock", "[scenario]") {
+  const Expected missing{4, "faulted", "E5001"};
+  run_with("color.stall_at=0", missing);
+  run_with("depth.stall_at=0", missing);
+  run_with("color.stall_at=20", stopped("E5003"));
+  run_with("color.clock=0.2", stopped("E5010"));
+  run_with("depth.clock=-5", stopped("E5010"));
+}
+
+TEST_CASE("a depth camera that repeats its picture is found out before it can mislead", "[scenario]") {
+  const Json frozen = run_with(in_sweep("depth.freeze_at", 17), stopped("E5011"));
+  CHECK(frozen["safety"]["stops"][0]["time_s"].get<double>() < sweep_start_s() + 22);
+  CHECK(frozen["truth"]["false_free_voxels"] == 0);
+}
+
+TEST_CASE("lost frames cost time, not the job", "[scenario]") { run_with("depth.drop=0.3,color.drop=0.3", kDone); }
+
+TEST_CASE("an obstacle that appears in reach is seen and kept clear of", "[scenario]") {
+  const Json result = run_with(in_sweep("obstacle.appear_at", 20), kDone);
+  CHECK(result["mapping"]["voxels"]["occupied"].get<int>() > 0);
+}
+
+TEST_CASE("Ctrl-C ends the job safely, also while a device is missing", "[scenario]") {
+  JobFolder folder;
+  folder.options.signal = SIGINT;
+  folder.options.signal_at = "self test";
+  const ProgramResult booting = folder.run_job("boot", {"--real-time", "--faults", "color.stall_at=0"});
+  INFO(booting.err);
+  CHECK(booting.exit_code == 6);
+  CHECK(begins_with(folder.read_json("boot/result.json")["reason"], "E5005"));
+  folder.options.signal = SIGTERM;
+  folder.options.signal_at = "identifying";
+  const ProgramResult running = folder.run_job("run");
+  CHECK(running.exit_code == 6);
+  check_safe(folder.read_json("run/result.json"));
+  CHECK(folder.run({"replay", "run/journal.flj"}).exit_code == 0);
+}
+
+}  // namespace firstlook

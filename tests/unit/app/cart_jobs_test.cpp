@@ -1,0 +1,265 @@
+#include "app/jobs/cart_jobs.hpp"
+
+#include <catch2/catch.hpp>
+#include <memory>
+
+#include "algorithms/vision/camera_model.hpp"
+#include "app/shell/event_codec.hpp"
+#include "platform/core/random.hpp"
+#include "platform/journal/archive.hpp"
+#include "platform/memory/allocation_guard.hpp"
+#include "tests/support/mock_color_camera.hpp"
+#include "tests/support/mock_depth_camera.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr CameraIntrinsics kColor{640, 480, 525, 525, 319.5, 239.5};
+const JointVector kStart{0, -1.57, 1.57, -1.57, -1.57, 0};  // the simulated cell's, rounded
+
+/// The flange's camera looks at a board 0.7 m ahead of where the arm starts; the depth camera at a wall.
+class Bench {
+ public:
+  Bench() : color_(kColor), workers_(2) {
+    color_.corners = [this](const hal::Frame&) { return seen_from(at_rad_); };
+    const Pose base_T_camera = forward(arm_, kStart).flange().pose() * flange_T_camera_;
+    Pose camera_T_board = Pose::Identity();
+    camera_T_board.translation() = Eigen::Vector3d(0, 0, 0.7) - board_.center();
+    base_T_board_ = base_T_camera * camera_T_board;
+    auto bench = Workbench::make(config_, {kStart, Transform<Camera, Depth>()}, color_, depth_, workers_);
+    REQUIRE(bench);
+    bench_ = std::move(*bench);
+    jobs_.emplace(*bench_);
+  }
+
+  struct Outcome {
+    bool done = false;
+    Fault failed = Fault::kInternal;
+    std::uint64_t refused = 0;
+    std::span<const std::byte> result;
+  };
+  /// Runs a job as the runner does: inside its heap allowance.
+  template <typename Arguments>
+  Outcome execute(JobKind kind, const Arguments& arguments, std::size_t heap_bytes = memory::kJobHeapBytes) {
+    request_->kind = static_cast<std::uint16_t>(kind);
+    request_->size = static_cast<std::uint32_t>(pack(arguments, std::span<std::byte>(request_->arguments)));
+    Outcome outcome;
+    std::size_t size = 0;
+    {
+      const memory::JobHeapScope heap(heap_bytes);
+      size = jobs_->execute(*request_, result_);
+      outcome.refused = heap.refused();
+    }
+    ByteReader reader(std::span<const std::byte>(result_).first(size));
+    reader(outcome.done);
+    if (!outcome.done) reader(outcome.failed);
+    REQUIRE(reader.ok());
+    outcome.result = std::span<const std::byte>(result_).subspan(1, size - 1);
+    return outcome;
+  }
+  template <typename JobResult, typename Arguments>
+  JobResult result_of(JobKind kind, const Arguments& arguments) {
+    const Outcome outcome = execute(kind, arguments);
+    REQUIRE(outcome.done);
+    JobResult result;
+    REQUIRE(unpack(outcome.result, result));
+    return result;
+  }
+
+  /// A frame of either camera, taken now with the arm at `q`.
+  PosedFrame frame(hal::FrameStream& camera, const JointVector& q) {
+    at_rad_ = q;
+    now_ = now_ + milliseconds(100);
+    const auto newest = camera.poll(now_);
+    REQUIRE(newest);
+    return {*newest, q};
+  }
+  DetectArguments look(BoardLook purpose, const JointVector& q) {
+    DetectArguments arguments;
+    arguments.purpose = purpose;
+    arguments.frames.push_back(frame(color_, q));
+    return arguments;
+  }
+  IntegrateArguments depth_look(const JointVector& q) {
+    IntegrateArguments arguments;
+    arguments.frame = frame(depth_, q);
+    arguments.now_s = now_.seconds();
+    arguments.at_view = true;
+    arguments.arm_rad = q;
+    return arguments;
+  }
+  [[nodiscard]] FromHere here(std::uint32_t step = 0) const { return {kStart, step, now_.seconds()}; }
+
+  /// Takes views all around until the calibration can be solved.
+  void take_views() {
+    Random random(7);
+    int taken = 0;
+    for (int attempt = 0; attempt < 2000 && taken < 12; ++attempt) {
+      JointVector q = kStart;
+      for (int joint = 0; joint < 6; ++joint) q[joint] += random.uniform(-0.3, 0.3);
+      if (seen_from(q)->corners_px.empty()) continue;
+      if (result_of<DetectResult>(JobKind::kDetectBoard, look(BoardLook::kCollect, q)).found) ++taken;
+    }
+    REQUIRE(taken == 12);
+  }
+  void calibrate() {
+    take_views();
+    REQUIRE(result_of<SolveResult>(JobKind::kSolve, NoArguments{}).solved);
+    REQUIRE(result_of<ValidateResult>(JobKind::kValidate, NoArguments{}).accepted);
+  }
+  mock::MockDepthCamera& depth() { return depth_; }
+  CartJobs& jobs() { return *jobs_; }
+
+ private:
+  [[nodiscard]] std::optional<hal::CornerObservation> seen_from(const JointVector& q) const {
+    const Pose base_T_camera = forward(arm_, q).flange().pose() * flange_T_camera_;
+    const Pose camera_T_board = base_T_camera.inverse(Eigen::Isometry) * base_T_board_;
+    Random noise(mix64(static_cast<std::uint64_t>(1e6 * (q[0] + 2 * q[3] + 3 * q[5] + 100))));
+    hal::CornerObservation seen;
+    for (int i = 0; i < board_.corners(); ++i) {
+      const auto pixel = project(kColor, camera_T_board * board_.corner(i));
+      if (!pixel || !in_image(kColor, *pixel, 10)) return hal::CornerObservation{};
+      seen.corners_px.push_back({static_cast<float>(pixel->x() + 0.05 * noise.normal()),
+                                 static_cast<float>(pixel->y() + 0.05 * noise.normal())});
+    }
+    return seen;
+  }
+
+  Config config_;
+  ArmModel arm_ = *find_arm_model("ur5");
+  BoardSpec board_{9, 6, 0.03};
+  Pose flange_T_camera_ = Pose(Eigen::Translation3d(0, -0.07, 0.06));
+  Pose base_T_board_ = Pose::Identity();
+  JointVector at_rad_ = kStart;
+  Instant now_{};
+  mock::MockColorCamera color_;
+  mock::MockDepthCamera depth_;
+  WorkerPool workers_;
+  std::unique_ptr<Workbench> bench_;
+  std::optional<CartJobs> jobs_;
+  std::unique_ptr<JobRequest> request_ = std::make_unique<JobRequest>();
+  std::array<std::byte, kJobResultBytesMax> result_{};
+};
+
+/// Lets the 1st, 2nd, 3rd and then rarer and rarer allocation of the job fail, until it gets by without. Each time the
+/// job fails with kOutOfMemory, or whoever allocated could do without; the process is there afterwards.
+template <typename MakeArguments>
+void fail_every_allocation(Bench& bench, JobKind kind, MakeArguments arguments) {
+  int failures = 0;
+  for (std::uint64_t nth = 1;; nth += 1 + nth / 8) {
+    const auto asked = arguments();
+    memory::fail_job_allocation(nth);
+    const Bench::Outcome outcome = bench.execute(kind, asked);
+    memory::fail_job_allocation(0);
+    INFO(name_of(kind) << ", allocation " << nth);
+    if (outcome.refused == 0) {
+      CHECK(outcome.done);
+      break;
+    }
+    if (!outcome.done) {
+      ++failures;
+      CHECK(outcome.failed == Fault::kOutOfMemory);
+    }
+  }
+  CHECK(bench.jobs().failed() >= static_cast<std::uint64_t>(failures));
+}
+
+}  // namespace
+
+TEST_CASE("no failed allocation of a job before the calibration ends the process", "[jobs]") {
+  Bench bench;
+  fail_every_allocation(bench, JobKind::kLocateViews, [&] { return bench.here(); });
+  fail_every_allocation(bench, JobKind::kIdentifyMotions, [&] { return bench.here(); });
+  fail_every_allocation(bench, JobKind::kNextCalibrationView, [&] { return bench.here(); });
+  fail_every_allocation(bench, JobKind::kPlan, [&] {
+    PlanArguments plan;
+    plan.from_rad = kStart;
+    plan.to_rad = kStart;
+    plan.to_rad[0] += 0.4;
+    return plan;
+  });
+  fail_every_allocation(bench, JobKind::kDetectBoard, [&] { return bench.look(BoardLook::kLocate, kStart); });
+}
+
+TEST_CASE("no failed allocation of a calibration job ends the process", "[jobs]") {
+  Bench bench;
+  bench.take_views();
+  fail_every_allocation(bench, JobKind::kNextCalibrationView, [&] { return bench.here(3); });
+  fail_every_allocation(bench, JobKind::kSolve, [] { return NoArguments{}; });
+  fail_every_allocation(bench, JobKind::kValidate, [] { return NoArguments{}; });
+}
+
+TEST_CASE("no failed allocation of a mapping job ends the process", "[jobs]") {
+  Bench bench;
+  bench.calibrate();
+  double wall_m = 1.2;
+  fail_every_allocation(bench, JobKind::kIntegrate, [&] {
+    bench.depth().wall_m = wall_m += 0.01;  // a picture that does not repeat itself
+    return bench.depth_look(kStart);
+  });
+  fail_every_allocation(bench, JobKind::kNextSweepView, [&] { return bench.here(1); });
+  fail_every_allocation(bench, JobKind::kNextView, [&] { return bench.here(2); });
+  fail_every_allocation(bench, JobKind::kCertifyPath, [&] {
+    PlanArguments plan;
+    plan.from_rad = plan.to_rad = kStart;
+    plan.phase = MotionPhase::kMapping;
+    return plan;
+  });
+  fail_every_allocation(bench, JobKind::kCheckBoard, [&] { return bench.look(BoardLook::kConclude, kStart); });
+  fail_every_allocation(bench, JobKind::kSummarize, [] { return NoArguments{}; });
+  fail_every_allocation(bench, JobKind::kForgetKnownFree, [] { return NoArguments{}; });
+}
+
+TEST_CASE("a job beyond its heap allowance fails with the memory's fault, and the next one is done", "[jobs]") {
+  Bench bench;
+  bench.take_views();
+  const Bench::Outcome starved = bench.execute(JobKind::kSolve, NoArguments{}, 4096);
+  CHECK(starved.refused > 0);
+  REQUIRE_FALSE(starved.done);
+  CHECK(starved.failed == Fault::kOutOfMemory);
+  CHECK(bench.jobs().failed() == 1);
+  CHECK(bench.result_of<SolveResult>(JobKind::kSolve, NoArguments{}).solved);
+}
+
+TEST_CASE("the machine hears of a failed job through the loop's queue", "[jobs]") {
+  Bench bench;
+  bench.take_views();
+  VirtualClock clock;
+  JobRunner runner(bench.jobs(), clock, JobMode::kVirtual, 4096);
+  auto request = std::make_unique<JobRequest>();
+  request->kind = static_cast<std::uint16_t>(JobKind::kSolve);
+  request->number = 5;
+  request->size = static_cast<std::uint32_t>(pack(NoArguments{}, std::span<std::byte>(request->arguments)));
+  REQUIRE(runner.submit(*request, clock.now()));
+  EventQueue queue;
+  runner.collect(clock.now(), queue);
+  REQUIRE_FALSE(queue.empty());
+  const auto event = decode_event(queue.front().kind, queue.front().bytes());
+  REQUIRE(event);
+  const auto* const done = std::get_if<JobCompleted>(&*event);
+  REQUIRE(done != nullptr);
+  CHECK(done->number == 5);
+  CHECK(done->failed == Fault::kOutOfMemory);
+  CHECK(runner.counters().refused_allocations > 0);
+}
+
+TEST_CASE("a depth picture that repeats itself is frozen, one without returns is not", "[jobs]") {
+  Bench bench;
+  bench.calibrate();
+  const auto integrate = [&] {
+    return bench.result_of<IntegrateResult>(JobKind::kIntegrate, bench.depth_look(kStart));
+  };
+  const IntegrateResult first = integrate();
+  CHECK(first.used);
+  CHECK_FALSE(first.frozen);
+  const IntegrateResult again = integrate();
+  CHECK(again.frozen);
+  CHECK_FALSE(again.used);
+  bench.depth().wall_m = 1.6;
+  CHECK_FALSE(integrate().frozen);
+  bench.depth().wall_m = 0;
+  CHECK_FALSE(integrate().frozen);
+  CHECK_FALSE(integrate().frozen);
+}
+
+}  // namespace firstlook
