@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "algorithms/mapping/map_image.hpp"
 #include "algorithms/mapping/reach_zone.hpp"
 
 namespace firstlook {
@@ -162,7 +161,7 @@ void Workbench::begin_mapping() {
   clearance_in_force_ = mapping_terms_->clearance();
   camera_body_ = body_with_camera(arm_, hand_eye_->flange_T_camera);
   mark_reach_zone(map_.geometry(), arm_, camera_body_.capsules, kZoneMargin_m, config_.map.low_m[2], zone_);
-  unknown_before_ = zone_counts().unknown;
+  unknown_before_ = unknown_at_view_ = zone_counts().unknown;
   rebuild_free_space(last_stamp_s_);
 }
 
