@@ -14,6 +14,7 @@
 #include "hal/sim/simulated_cell.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/terminal.hpp"
+#include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {
 namespace {
@@ -179,7 +180,13 @@ int run_job(const RunCommand& command) {
   options.scope = command.scope;
   options.real_time = command.real_time;
   options.journal_path = folder + "/journal.flj";
-  auto cart = Cart::make(config, options, facts, devices, narrator);
+  std::int64_t boot_heap_bytes = 0;
+  auto cart = [&] {
+    const memory::JobHeapScope boot(memory::kHeapUncapped);
+    auto made = Cart::make(config, options, facts, devices, narrator);
+    boot_heap_bytes = boot.outstanding_bytes();
+    return made;
+  }();
   if (!cart) return fail(cart.error());
 
   const KnownFree known_free((*cart)->published());
@@ -192,6 +199,7 @@ int run_job(const RunCommand& command) {
   narrator.line("grading against the simulated cell's truth");
   grade(world.grader(), **cart, config, record);
   world.grader().watch(nullptr);
+  record.wall.boot_heap_bytes = static_cast<std::uint64_t>(std::max<std::int64_t>(0, boot_heap_bytes));
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";
   record.wall.folder = folder;
   if (const Status written = write_run_files(folder, record, (*cart)->map_files()); !written) {

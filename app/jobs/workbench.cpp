@@ -95,6 +95,8 @@ Status Workbench::take_memory() {
   };
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
+  const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
+  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * sizeof(Eigen::Vector2d);
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,
@@ -102,6 +104,9 @@ Status Workbench::take_memory() {
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
            std::pair{memory::Pool::kViewCandidates, ViewChooser::required_bytes(g, config_.explore.candidates, 2,
                                                                                 config_.explore.certificate_samples)},
+           std::pair{memory::Pool::kPlannerNodes, 2 * Planner::required_bytes()},  // ours and the chooser's
+           std::pair{memory::Pool::kCalibrationViews, views * view},
+           std::pair{memory::Pool::kApplication, sizeof(Workbench) + kViewRecordsMax * sizeof(MappingViewRecord)},
        }) {
     if (const Status status = account(pool, bytes); !status) return status;
   }

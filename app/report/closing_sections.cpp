@@ -48,6 +48,7 @@ std::string wall_section(const RunRecord& record) {
                                                        "(--real-time measures)")});
   table.row({"resident memory, simulated cell included", mib_text(w.rss_bytes)});
   table.row({"of it program and shared libraries", mib_text(w.library_bytes)});
+  table.row({"heap that boot took, all counted rows together, measured", mib_text(w.boot_heap_bytes)});
   table.row({"largest heap of a job, measured", mib_text(w.job_heap_peak_bytes)});
   table.row({"workers", fmt::format("{}", w.workers)});
   table.row({"folder", w.folder});

@@ -26,7 +26,7 @@ p{margin:8px 0}.hint{color:var(--soft);font-size:13.5px}
 code,pre{font-family:ui-monospace,"SF Mono",Consolas,"DejaVu Sans Mono",monospace;font-size:12.8px}
 code{background:#eef1f4;border-radius:4px;padding:1px 4px}
 pre{background:#eef1f4;border-radius:8px;padding:10px 12px;overflow-x:auto;margin:6px 0;white-space:pre}
-.scroll{overflow-x:auto}
+.scroll{overflow-x:auto}.scroll+.scroll{margin-top:14px}
 table{border-collapse:collapse;width:100%;font-size:14px;font-variant-numeric:tabular-nums}
 th{text-align:left;font-weight:600;color:var(--soft);font-size:12.5px;border-bottom:1px solid #cdd4dc;padding:5px 10px 5px 0}
 td{border-bottom:1px solid var(--rule);padding:5px 10px 5px 0;vertical-align:top;overflow-wrap:anywhere;white-space:pre-wrap}

@@ -64,6 +64,7 @@ Json wall_json(const WallRecord& wall) {
           {"stall_s", wall.stall_s},
           {"real_time", wall.real_time},
           {"rss_bytes", wall.rss_bytes},
+          {"boot_heap_bytes", wall.boot_heap_bytes},
           {"job_heap_peak_bytes", wall.job_heap_peak_bytes},
           {"library_bytes", wall.library_bytes},
           {"folder", wall.folder},

@@ -164,6 +164,7 @@ struct WallRecord {
   double stall_s = 0;
   bool real_time = false;
   std::uint64_t rss_bytes = 0;
+  std::uint64_t boot_heap_bytes = 0;      ///< what boot took from the heap and kept; measured by the allocator
   std::uint64_t job_heap_peak_bytes = 0;  ///< the largest of all jobs; measured by the allocator
   std::uint64_t library_bytes = 0;        ///< resident pages of files: program and shared libraries
   std::string folder;

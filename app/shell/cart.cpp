@@ -56,6 +56,9 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   for (EventSource* source : sources) cart->loop_->add_source(*source);
   cart->loop_->set_watchdog(&cart->watchdog_);
   cart->machine_.emplace(machine_settings(cart->config_, options.scope), cart->decisions_);
+  auto share = memory::PoolShare::take(memory::Pool::kApplication, sizeof(Cart));
+  if (!share) return std::unexpected(share.error());
+  cart->share_ = std::move(*share);
   return cart;
 }
 

@@ -119,6 +119,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   LoggedDecisions decisions_;
   std::optional<Machine> machine_;
   JobRequest request_;
+  memory::PoolShare share_;  ///< of the memory page, for the cart itself
 
   // What the report tells.
   FixedVector<PhasePassed, 128> phases_;

@@ -173,7 +173,8 @@ RunRecord make_record() {
                            {"heap of jobs", 128u << 20, 128u << 20, true}}};
   r.faults = {{151.2, Fault::kProgramStopped, "program stopped on the pendant"}};
   r.provenance = {"0.1.0", "ur5", "full", "cell: workshop\n", "77aa01"};
-  r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 70u << 20, 40u << 20, "runs/20260131-7", 2};
+  r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
+            "runs/20260131-7",      2};
   r.truth = TruthRecord{0.21, 0.34, 4.7, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }
