@@ -1,5 +1,10 @@
 /// firstlook: the only file that names concrete devices.
+<<<<<<< HEAD
 #include <cerrno>
+=======
+#include <algorithm>
+#include <cctype>
+>>>>>>> rep
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -16,6 +21,7 @@
 #include "hal/sim/simulated_cell.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/terminal.hpp"
+#include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {
 namespace {
@@ -80,8 +86,20 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   if (!config.parking_rad) config.parking_rad = cell.start_rad;
 }
 
+/// Pictures of a part that the cell's description names, with what the grader says of it.
+void add_part_pictures(const sim::RegionFigure& region, double known_after_sweep, const Cart& cart, RunRecord& record) {
+  const auto known = [](double share) { return fmt::format(": {:.0f} % of what can be observed known", 100 * share); };
+  std::string name = region.name;
+  std::ranges::replace(name, '_', ' ');
+  if (!name.empty()) name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
+  for (MapPicture& picture : cart.pictures_of_part({name, region.low_m, region.high_m}, known(known_after_sweep),
+                                                   known(region.known_fraction))) {
+    record.map_pictures.push_back(std::move(picture));
+  }
+}
+
 /// Grades the finished job against the truth of the simulated cell.
-TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
+void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecord& record) {
   const Workbench& bench = cart.bench();
   sim::FinalClaims claims;
   if (bench.hand_eye()) {
@@ -97,7 +115,7 @@ TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
   claims.observable.sensor_range_trusted_m = config.depth.range_trusted_m;
   claims.observable.zone_floor_m = config.map.low_m[2];
   const sim::TruthFigures figures = grader.grade(claims);
-  TruthRecord truth;
+  TruthRecord& truth = record.truth.emplace();
   truth.hand_eye_error_mm = figures.hand_eye_error_mm;
   truth.hand_eye_error_mrad = figures.hand_eye_error_mrad;
   truth.hand_eye_mahalanobis2 = figures.hand_eye_mahalanobis2;
@@ -105,15 +123,15 @@ TruthRecord grade(sim::Grader& grader, const Cart& cart, const Config& config) {
   truth.unknown_entries = figures.unknown_entries;
   truth.coverage_of_observable = figures.coverage_of_observable;
   truth.false_free_voxels = figures.false_free_voxels;
-  if (claims.map == nullptr) return truth;
+  if (claims.map == nullptr) return;
   const VoxelMap swept = bench.map_after_sweep();
   claims.map = &swept;
   const auto after_sweep = grader.regions(claims);
   for (std::size_t i = 0; i < figures.regions.size() && i < after_sweep.size(); ++i) {
     const sim::RegionFigure& region = figures.regions[i];
     truth.regions.push_back({region.name, region.observable, after_sweep[i].known_fraction, region.known_fraction});
+    add_part_pictures(region, after_sweep[i].known_fraction, cart, record);
   }
-  return truth;
 }
 
 void narrate_result(const RunRecord& record, Narrator& narrator) {
@@ -127,8 +145,9 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
   }
   if (record.mapping) {
     const VoxelCounts& v = record.mapping->voxels;
-    narrator.line(fmt::format("map       {} free, {} occupied, {} unknown voxels of {} m after {} views", v.free,
-                              v.occupied, v.unknown, record.mapping->resolution_m, record.mapping->views.size()));
+    narrator.line(fmt::format("map       {} free, {} occupied, {} unknown voxels of {} m in reach after {} views",
+                              v.free, v.occupied, v.unknown, record.mapping->resolution_m,
+                              record.mapping->views.size()));
   }
   if (record.truth) {
     const TruthRecord& t = *record.truth;
@@ -171,7 +190,13 @@ int run_job(const RunCommand& command) {
   options.scope = command.scope;
   options.real_time = command.real_time;
   options.journal_path = folder + "/journal.flj";
-  auto cart = Cart::make(config, options, facts, devices, narrator);
+  std::int64_t boot_heap_bytes = 0;
+  auto cart = [&] {
+    const memory::JobHeapScope boot(memory::kHeapUncapped);
+    auto made = Cart::make(config, options, facts, devices, narrator);
+    boot_heap_bytes = boot.outstanding_bytes();
+    return made;
+  }();
   if (!cart) return fail(cart.error());
 
   const KnownFree known_free((*cart)->published());
@@ -182,8 +207,9 @@ int run_job(const RunCommand& command) {
 
   RunRecord record = (*cart)->record();
   narrator.line("grading against the simulated cell's truth");
-  record.truth = grade(world.grader(), **cart, config);
+  grade(world.grader(), **cart, config, record);
   world.grader().watch(nullptr);
+  record.wall.boot_heap_bytes = static_cast<std::uint64_t>(std::max<std::int64_t>(0, boot_heap_bytes));
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";
   record.wall.folder = folder;
   narrate_result(record, narrator);

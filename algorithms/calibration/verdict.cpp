@@ -19,7 +19,9 @@ using Indices = std::vector<std::size_t>;
 
 /// What validation needs of a calibration, whether it came from corners or from pose pairs.
 struct Validation {
-  std::vector<PosePair> pairs;                                ///< of the used views
+  std::vector<PosePair> pairs;  ///< of the used views
+  Indices given;                ///< which of the views given each of them is
+  std::size_t views_given = 0;
   std::function<Result<Refinement>(const Indices&)> resolve;  ///< a short solve with some of them
   /// Sum of squared reprojection errors (px^2, both coordinates) of one view under a solution; empty without corners.
   std::function<double(std::size_t, const Refinement&)> squared_px;
@@ -54,7 +56,11 @@ void hold_out(const Validation& validation, HandEyeResult& result) {
       const auto seen =
           validation.pairs[i].base_T_flange * solved->flange_T_camera * validation.pairs[i].camera_T_board;
       squared_m += (seen * validation.board_center - solved->base_T_board * validation.board_center).squaredNorm();
-      if (validation.squared_px) squared_px += validation.squared_px(i, *solved);
+      if (validation.squared_px) {
+        const double view_px = validation.squared_px(i, *solved);
+        squared_px += view_px;
+        result.holdout_px[validation.given[i]] = std::sqrt(view_px / (2 * validation.corners));
+      }
       views += 1;
     }
   }
@@ -140,6 +146,8 @@ void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, H
 void validate(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
   result.holdout_rms_px = result.holdout_rms_m = 0;
   result.subset_spread_m = result.subset_spread_rad = 0;
+  result.holdout_px.clear();
+  if (validation.squared_px) result.holdout_px.resize(validation.views_given);
   hold_out(validation, result);
   const int failed = spread_of_subsets(validation, options, result);
   result.usable_distance_m = usable_distance(result.flange_T_camera, result.covariance, options.limits.tolerance_m);
@@ -162,11 +170,13 @@ HandEyeResult start_result(const Refinement& refinement, std::span<const PosePai
   result.board_in_base = board_in_base_residual(used_pairs, refinement.flange_T_camera);
   result.views = refinement.views_used;
   result.fits = refinement.views;
+  result.reasons = {"not validated"};
   return result;
 }
 
 /// Views and their pose pairs that `fits` calls used (all that show a board when it is empty).
 struct UsedViews {
+  Indices given;
   std::vector<CalibrationView> views;
   std::vector<PosePair> pairs;
 };
@@ -178,6 +188,7 @@ UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, s
     if (i < fits.size() && !fits[i].used) continue;
     const auto pose = estimate_board_pose_robust(camera, board, views[i].corners_px);
     if (!pose) continue;
+    used.given.push_back(i);
     used.views.push_back(views[i]);
     used.pairs.push_back({views[i].base_T_flange, pose->pose.camera_T_board});
   }
@@ -226,6 +237,8 @@ void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, s
   const RefinementOptions quick = short_options(options, result);
   Validation validation;
   validation.pairs = used.pairs;
+  validation.given = used.given;
+  validation.views_given = views.size();
   validation.board_center = board.center();
   validation.corners = board.corners();
   validation.resolve = [&](const Indices& indices) {

@@ -1,6 +1,7 @@
 /// The whole hand-eye calibration: solve, validate, judge.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -60,6 +61,9 @@ struct HandEyeResult {
   bool from_pairs = false;
   int views = 0;              ///< used in the solve
   std::vector<ViewFit> fits;  ///< one for each view given
+  /// One for each view given: its reprojection RMS (px) under a solve that left it out; empty for a view that was not
+  /// used. Empty as a whole until validated and when solved from pose pairs.
+  std::vector<std::optional<double>> holdout_px;
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons;  ///< why rejected; empty when accepted
 };
@@ -74,7 +78,7 @@ struct HandEyeResult {
                                                                   const HandEyeOptions& options = {});
 
 /// The two halves of calibrate_hand_eye for a job that solves first and validates later: the first leaves holdout,
-/// subsets, usable distance and verdict (kRejected) unset.
+/// subsets and usable distance unset and the verdict kRejected, "not validated".
 [[nodiscard]] Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
                                                    std::span<const CalibrationView> views,
                                                    const HandEyeOptions& options = {});

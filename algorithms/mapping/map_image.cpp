@@ -13,14 +13,14 @@ namespace {
 
 using Color = std::array<double, 3>;
 
-constexpr Color kBackground = {250, 250, 252};
-constexpr Color kSliceUnknown = {168, 174, 184};
-constexpr Color kSliceFree = {244, 247, 240};
+constexpr Color kBackground = {255, 255, 255};
+constexpr Color kFloor = {243, 245, 247};
+constexpr Color kFloorLine = {214, 219, 225};
+constexpr Color kSliceUnknown = {188, 192, 199};
+constexpr Color kSliceFree = {247, 249, 244};
 constexpr Color kSliceOccupied = {36, 40, 48};
-constexpr Color kVeil = {120, 130, 160};
-constexpr Color kPathLine = {40, 40, 40};
-constexpr Color kViewDot = {214, 39, 40};
-constexpr double kVeilOpacity = 0.03;  // of one unknown voxel: 20 of them hide half
+constexpr Color kVeil = {141, 106, 186};  // unknown in the reach of the arm, in every kind of picture
+constexpr double kVeilOpacity = 0.03;     // of one unknown voxel: 20 of them hide half
 
 void put(RgbImage image, int column, int row, const Color& color) {
   if (column < 0 || row < 0 || column >= image.width || row >= image.height) return;
@@ -29,54 +29,29 @@ void put(RgbImage image, int column, int row, const Color& color) {
   for (std::size_t i = 0; i < 3; ++i) image.data[at + i] = static_cast<std::uint8_t>(std::clamp(color[i], 0.0, 255.0));
 }
 
-void draw_dot(RgbImage image, const Eigen::Vector2d& at, double radius_px, const Color& color) {
-  const int reach = static_cast<int>(std::ceil(radius_px));
-  const int column = static_cast<int>(std::lround(at.x())), row = static_cast<int>(std::lround(at.y()));
-  for (int dy = -reach; dy <= reach; ++dy)
-    for (int dx = -reach; dx <= reach; ++dx)
-      if (std::hypot(dx, dy) <= radius_px) put(image, column + dx, row + dy, color);
+/// What a line of sight meets below all voxels: the floor of the grid with its lines, or nothing.
+Color ground(const GridGeometry& g, const Eigen::Vector3d& point_m, const Eigen::Vector3d& direction, double m_per_px) {
+  if (direction.z() > -1e-9) return kBackground;
+  const Eigen::Vector3d low = g.first.cast<double>() * g.resolution_m;
+  const Eigen::Vector3d high = (g.first + g.size).cast<double>() * g.resolution_m;
+  const Eigen::Vector3d at = point_m + (low.z() - point_m.z()) / direction.z() * direction;
+  double line = 0;
+  for (int axis = 0; axis < 2; ++axis) {
+    if (at[axis] < low[axis] || at[axis] > high[axis]) return kBackground;
+    const double off_m = std::abs(at[axis] - std::round(at[axis] / kFloorLines_m) * kFloorLines_m);
+    line = std::max(line, std::clamp(1.2 - off_m / m_per_px, 0.0, 1.0));
+  }
+  Color color;
+  for (std::size_t i = 0; i < 3; ++i) color[i] = kFloor[i] + line * (kFloorLine[i] - kFloor[i]);
+  return color;
 }
-
-void draw_line(RgbImage image, const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Color& color) {
-  const int steps = std::max(1, static_cast<int>(std::ceil((to - from).norm())));
-  for (int i = 0; i <= steps; ++i) {
-    const Eigen::Vector2d at = from + (to - from) * (static_cast<double>(i) / steps);
-    put(image, static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())), color);
-  }
-}
-
-// Parallel projection: which point and direction belongs to a pixel, and which pixel to a point.
-struct Projection {
-  Eigen::Vector3d right, up, into;  // unit axes of the picture; `into` points away from the eye
-  Eigen::Vector3d target_m;
-  double m_per_px = 1;
-  double center_column = 0, center_row = 0;
-
-  Projection(const Viewpoint& view, RgbImage image) : target_m(view.target_m) {
-    const double ca = std::cos(view.azimuth_rad), sa = std::sin(view.azimuth_rad);
-    const double ce = std::cos(view.elevation_rad), se = std::sin(view.elevation_rad);
-    into = Eigen::Vector3d(-ca * ce, -sa * ce, -se);
-    right = Eigen::Vector3d(-sa, ca, 0);
-    up = right.cross(into);
-    m_per_px = view.width_m / image.width;
-    center_column = (image.width - 1) / 2.0;
-    center_row = (image.height - 1) / 2.0;
-  }
-  [[nodiscard]] Eigen::Vector3d through(int column, int row) const {
-    return target_m + m_per_px * ((column - center_column) * right - (row - center_row) * up);
-  }
-  [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector3d& point_m) const {
-    const Eigen::Vector3d d = point_m - target_m;
-    return {center_column + d.dot(right) / m_per_px, center_row - d.dot(up) / m_per_px};
-  }
-};
 
 // Light from above and from the side: top faces bright, faces across y darkest.
 double face_brightness(int axis) { return axis == 2 ? 1.0 : axis == 0 ? 0.82 : 0.66; }
 
-// Follows one line of sight through the grid: veil of unknown voxels in front of the first occupied one.
+// Follows one line of sight through the grid: veil of unknown voxels in front of the first occupied one or the floor.
 Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, const Eigen::Vector3d& point_m,
-           const Eigen::Vector3d& direction) {
+           const Eigen::Vector3d& direction, double m_per_px) {
   const GridGeometry& g = map.geometry();
   const Eigen::Vector3d origin = point_m / g.resolution_m - g.first.cast<double>();
   double enter = -std::numeric_limits<double>::infinity(), leave = -enter;
@@ -125,48 +100,94 @@ Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, const Eigen:
       next[face] += delta[face];
     }
   }
-  over(kBackground, 1);
+  over(ground(g, point_m, direction, m_per_px), 1);
   return color;
 }
 
 }  // namespace
 
-void draw_slice(const VoxelMap& map, double z_m, RgbImage image) {
+SliceWindow SliceWindow::of(const GridGeometry& g) {
+  return {(g.first.cast<double>() * g.resolution_m).head<2>(),
+          ((g.first + g.size).cast<double>() * g.resolution_m).head<2>()};
+}
+
+Eigen::Vector2d SliceWindow::pixel(const Eigen::Vector2d& point_m, int width, int height) const {
+  return {(point_m.x() - low_m.x()) / (high_m.x() - low_m.x()) * width - 0.5,
+          (high_m.y() - point_m.y()) / (high_m.y() - low_m.y()) * height - 0.5};
+}
+
+void draw_slice(const VoxelMap& map, double z_m, const SliceWindow& window, std::span<const std::uint8_t> zone,
+                RgbImage image) {
   ENSURE(3081, image.data != nullptr && image.width > 0 && image.height > 0);
+  ENSURE(3084, zone.empty() || zone.size() == map.size());
   const GridGeometry& g = map.geometry();
-  const double px_per_voxel =
-      std::min(static_cast<double>(image.width) / g.size.x(), static_cast<double>(image.height) / g.size.y());
-  const double left = (image.width - px_per_voxel * g.size.x()) / 2;
-  const double bottom = (image.height + px_per_voxel * g.size.y()) / 2;
-  const double k = std::floor(z_m / g.resolution_m) - g.first.z();
-  const bool layer_exists = k >= 0 && k < g.size.z();
+  const Eigen::Vector2d px_m = (window.high_m - window.low_m).array() / Eigen::Array2d(image.width, image.height);
   for (int row = 0; row < image.height; ++row) {
     for (int column = 0; column < image.width; ++column) {
-      const Eigen::Vector3i v(static_cast<int>(std::floor((column + 0.5 - left) / px_per_voxel)),
-                              static_cast<int>(std::floor((bottom - row - 0.5) / px_per_voxel)),
-                              layer_exists ? static_cast<int>(k) : 0);
-      Color color = kBackground;
+      const Eigen::Vector3i v =
+          g.voxel({window.low_m.x() + (column + 0.5) * px_m.x(), window.high_m.y() - (row + 0.5) * px_m.y(), z_m});
+      Color color = kSliceUnknown;
       if (g.contains(v)) {
-        const VoxelClass c = layer_exists ? map.voxel_class(g.index(v)) : VoxelClass::kUnknown;
-        color = c == VoxelClass::kFree ? kSliceFree : c == VoxelClass::kOccupied ? kSliceOccupied : kSliceUnknown;
+        const std::size_t index = g.index(v);
+        const VoxelClass c = map.voxel_class(index);
+        color = c == VoxelClass::kFree             ? kSliceFree
+                : c == VoxelClass::kOccupied       ? kSliceOccupied
+                : zone.empty() || zone[index] != 0 ? kVeil
+                                                   : kSliceUnknown;
       }
       put(image, column, row, color);
     }
   }
 }
 
-void draw_map(const VoxelMap& map, const Viewpoint& viewpoint, std::span<const std::uint8_t> zone,
-              std::span<const Eigen::Vector3d> views_m, RgbImage image) {
+Viewpoint Viewpoint::seeing(const Eigen::Vector3d& low_m, const Eigen::Vector3d& high_m, double azimuth_rad,
+                            double elevation_rad, int width, int height, double border_px) {
+  ENSURE(3085, width > 2 * border_px && height > 2 * border_px);
+  Viewpoint viewpoint{azimuth_rad, elevation_rad, (low_m + high_m) / 2, 1};
+  // How far the corners spread in the picture, in m to either side of the target: the box is symmetric about it.
+  const MapProjection unit(viewpoint, 1, 1);
+  Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d p((corner & 1) != 0 ? low_m.x() : high_m.x(), (corner & 2) != 0 ? low_m.y() : high_m.y(),
+                            (corner & 4) != 0 ? low_m.z() : high_m.z());
+    spread_m = spread_m.cwiseMax(unit.pixel(p).cwiseAbs() * unit.m_per_px());
+  }
+  const double m_per_px =
+      std::max(2 * spread_m.x() / (width - 2 * border_px), 2 * spread_m.y() / (height - 2 * border_px));
+  viewpoint.width_m = m_per_px * width;
+  return viewpoint;
+}
+
+MapProjection::MapProjection(const Viewpoint& view, int width, int height) : target_m_(view.target_m) {
+  const double ca = std::cos(view.azimuth_rad), sa = std::sin(view.azimuth_rad);
+  const double ce = std::cos(view.elevation_rad), se = std::sin(view.elevation_rad);
+  into_ = Eigen::Vector3d(-ca * ce, -sa * ce, -se);
+  right_ = Eigen::Vector3d(-sa, ca, 0);
+  up_ = right_.cross(into_);
+  m_per_px_ = view.width_m / width;
+  center_column_ = (width - 1) / 2.0;
+  center_row_ = (height - 1) / 2.0;
+}
+
+Eigen::Vector3d MapProjection::through(int column, int row) const {
+  return target_m_ + m_per_px_ * ((column - center_column_) * right_ - (row - center_row_) * up_);
+}
+
+Eigen::Vector2d MapProjection::pixel(const Eigen::Vector3d& point_m) const {
+  const Eigen::Vector3d d = point_m - target_m_;
+  return {center_column_ + d.dot(right_) / m_per_px_, center_row_ - d.dot(up_) / m_per_px_};
+}
+
+void draw_map(const VoxelMap& map, const Viewpoint& viewpoint, std::span<const std::uint8_t> zone, RgbImage image) {
   ENSURE(3082, image.data != nullptr && image.width > 0 && image.height > 0);
   ENSURE(3083, zone.empty() || zone.size() == map.size());
-  const Projection projection(viewpoint, image);
-  for (int row = 0; row < image.height; ++row)
-    for (int column = 0; column < image.width; ++column)
-      put(image, column, row, look(map, zone, projection.through(column, row), projection.into));
-  for (std::size_t i = 1; i < views_m.size(); ++i)
-    draw_line(image, projection.pixel(views_m[i - 1]), projection.pixel(views_m[i]), kPathLine);
-  const double radius_px = std::max(2.0, image.width / 200.0);
-  for (const Eigen::Vector3d& view_m : views_m) draw_dot(image, projection.pixel(view_m), radius_px, kViewDot);
+  const MapProjection projection(viewpoint, image.width, image.height);
+  for (int row = 0; row < image.height; ++row) {
+    for (int column = 0; column < image.width; ++column) {
+      put(image, column, row,
+          look(map, zone, projection.through(column, row), projection.into(), projection.m_per_px()));
+    }
+  }
 }
 
 }  // namespace firstlook

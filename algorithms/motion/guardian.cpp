@@ -1,6 +1,7 @@
 #include "algorithms/motion/guardian.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -44,8 +45,10 @@ double displacement_m(const ArmModel& arm, const Body& body, const JointVector& 
 /// Looks at points all over a capsule: its axis (nothing may be within the radius), and its surface.
 class CapsuleSampler {
  public:
-  CapsuleSampler(const FreeSpace& space, const Clearance& need, const Capsule& placed, double spacing_m)
-      : space_(space), need_(need), c_(placed), spacing_m_(spacing_m) {
+  using Margins = std::array<double, 2>;  // one for each of two requirements
+
+  CapsuleSampler(const FreeSpace& space, const std::array<Clearance, 2>& needs, const Capsule& placed, double spacing_m)
+      : space_(space), needs_(needs), c_(placed), spacing_m_(spacing_m) {
     const Eigen::Vector3d d = c_.b - c_.a;
     length_m_ = d.norm();
     axis_ = length_m_ > 0 ? Eigen::Vector3d(d / length_m_) : Eigen::Vector3d::UnitZ();
@@ -53,11 +56,11 @@ class CapsuleSampler {
     side_ = axis_.cross(across_);
   }
 
-  double margin() {
+  Margins margins() {
     const int rings = 1 + static_cast<int>(std::ceil(length_m_ / spacing_m_));
     for (int i = 0; i <= rings; ++i) {
       const Eigen::Vector3d centre = c_.a + (c_.b - c_.a) * (static_cast<double>(i) / rings);
-      margin_ = std::min(margin_, space_.margin_m(centre, need_) - c_.radius_m);
+      take(centre, c_.radius_m);
       ring(centre, c_.radius_m);
     }
     const int latitudes = 1 + static_cast<int>(std::ceil(c_.radius_m * std::numbers::pi / 2 / spacing_m_));
@@ -67,10 +70,15 @@ class CapsuleSampler {
       ring(c_.b + along, c_.radius_m * std::cos(angle));
       ring(c_.a - along, c_.radius_m * std::cos(angle));
     }
-    return margin_;
+    return margins_;
   }
 
  private:
+  void take(const Eigen::Vector3d& point, double radius_m) {
+    const Margins here = space_.margins_m(point, needs_);
+    for (std::size_t i = 0; i < here.size(); ++i) margins_[i] = std::min(margins_[i], here[i] - radius_m);
+  }
+
   void ring(const Eigen::Vector3d& centre, double radius_m) {
     const int points = std::max(1, static_cast<int>(std::ceil(2 * std::numbers::pi * radius_m / spacing_m_)));
     const double c = std::cos(2 * std::numbers::pi / points);
@@ -78,7 +86,7 @@ class CapsuleSampler {
     double x = radius_m;
     double y = 0;
     for (int i = 0; i < points; ++i) {
-      margin_ = std::min(margin_, space_.margin_m(centre + across_ * x + side_ * y, need_));
+      take(centre + across_ * x + side_ * y, 0);
       const double turned = c * x - s * y;
       y = s * x + c * y;
       x = turned;
@@ -86,13 +94,19 @@ class CapsuleSampler {
   }
 
   const FreeSpace& space_;
-  const Clearance& need_;
+  const std::array<Clearance, 2>& needs_;
   const Capsule& c_;
   double spacing_m_;
   double length_m_ = 0;
   Eigen::Vector3d axis_, across_, side_;
-  double margin_ = std::numeric_limits<double>::infinity();
+  Margins margins_ = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
 };
+
+/// What a distance to voxel centres has to be shortened by.
+Clearance half_a_voxel(const FreeSpace& space) {
+  const DistanceField* field = space.field != nullptr ? space.field : space.revoked;
+  return {.voxels_m = field != nullptr ? field->geometry().resolution_m * std::sqrt(3.0) / 2 : 0, .surface_m = 0};
+}
 
 }  // namespace
 
@@ -105,12 +119,14 @@ GuardianVerdict check(const ArmModel& arm, const Body& body, const FreeSpace& sp
     verdict.path_fraction = nearest_fraction(body, *path, q_rad);
     verdict.deviation_m = displacement_m(arm, body, q_rad, interpolate(path->from, path->to, verdict.path_fraction));
   }
-  verdict.margin_m = std::numeric_limits<double>::infinity();
+  verdict.margin_m = verdict.distance_m = std::numeric_limits<double>::infinity();
+  const std::array<Clearance, 2> needs = {clearance, half_a_voxel(space)};
   const Capsules placed = place(body.capsules, forward(arm, q_rad));
   for (std::size_t i = 0; i < placed.size(); ++i) {
     if (body.exempt[i] != 0) continue;
-    const double margin = CapsuleSampler(space, clearance, placed[i], spacing_m).margin();
+    const auto [margin, distance] = CapsuleSampler(space, needs, placed[i], spacing_m).margins();
     if (margin < verdict.margin_m) verdict.margin_m = margin, verdict.capsule = static_cast<int>(i);
+    verdict.distance_m = std::min(verdict.distance_m, distance);
   }
   if (!(verdict.margin_m >= 0)) {
     verdict.finding = GuardianFinding::kNotFree;

@@ -16,7 +16,10 @@ struct GuardianVerdict {
   double deviation_m = 0;    ///< largest displacement of any body point from the path; 0 without a path
   double path_fraction = 0;  ///< of the nearest point of the path
   double margin_m = 0;       ///< smallest over the sampled surface points, beyond the required clearance
-  int capsule = -1;          ///< where the margin is smallest
+  /// Smallest distance of the sampled surface points to what is not free: half a voxel diagonal less than to the centre
+  /// of a voxel, so that no corner of it is nearer. Negative inside.
+  double distance_m = 0;
+  int capsule = -1;  ///< where the margin is smallest
   [[nodiscard]] bool fine() const { return finding == GuardianFinding::kFine; }
 };
 

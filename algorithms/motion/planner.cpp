@@ -22,6 +22,11 @@ std::unexpected<Error> blocked(Fault fault, std::string_view what, const Body& b
 
 }  // namespace
 
+std::size_t Planner::required_bytes(int nodes_max) {
+  const auto nodes = static_cast<std::size_t>(nodes_max);
+  return 2 * nodes * sizeof(Node) + (2 * nodes + 2) * sizeof(JointVector);
+}
+
 Planner::Planner(int nodes_max) : nodes_max_(static_cast<std::size_t>(nodes_max)) {
   ENSURE(4131, nodes_max >= 2);
   from_start_.reserve(nodes_max_);

@@ -34,6 +34,8 @@ class Planner {
  public:
   /// Room for `nodes_max` configurations in each of the two trees.
   explicit Planner(int nodes_max = 4000);
+  /// What such a planner reserves.
+  [[nodiscard]] static std::size_t required_bytes(int nodes_max = 4000);
 
   /// A certified path. The same arguments give the same path. Errors: kStartBlocked (the start is not free),
   /// kNoPath (the goal is not free or outside the limits, or no connection was found; the detail says which and where).

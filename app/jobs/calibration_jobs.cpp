@@ -183,6 +183,8 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
     r.detected_px = o.view.corners_px;
     r.rms_px = o.residual_rms_px;
     if (hand_eye_) {
+      if (i < hand_eye_->fits.size()) r.used = hand_eye_->fits[i].used;
+      if (i < hand_eye_->holdout_px.size()) r.holdout_px = hand_eye_->holdout_px[i];
       const auto camera_T_board =
           (o.view.base_T_flange * hand_eye_->flange_T_camera).inverse() * hand_eye_->base_T_board;
       for (int c = 0; c < board_.corners(); ++c) {

@@ -1,7 +1,6 @@
 /// Jobs of the map: a depth frame goes in, and at the end what remains unknown is named.
 #include <algorithm>
 
-#include "algorithms/mapping/map_image.hpp"
 #include "algorithms/mapping/remaining.hpp"
 #include "algorithms/mapping/self_filter.hpp"
 #include "app/jobs/workbench.hpp"
@@ -42,13 +41,12 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   result.occupied = counts.occupied;
   result.gained = unknown_before_ > counts.unknown ? unknown_before_ - counts.unknown : 0;
   unknown_before_ = counts.unknown;
-  if (arguments.at_view) {
-    chooser_.remember_look(context(clearance_in_force_), arguments.frame.at_rad);
-    note_view(arguments, result.gained);
-  }
+  if (arguments.at_view) chooser_.remember_look(context(clearance_in_force_), arguments.frame.at_rad);
+  note_frame(arguments, counts);
   return result;
 }
 
+<<<<<<< HEAD
 /// A camera that hangs may go on sending the last picture with new stamps. A picture without any return proves nothing.
 bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
   const std::span<const std::uint16_t> pixels = depth_pixels_.items();
@@ -66,17 +64,28 @@ bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
 void Workbench::note_view(const IntegrateArguments& arguments, std::uint64_t gained) {
   if (mapping_views_.size() == mapping_views_.capacity()) return;
   const VoxelCounts counts = zone_counts();
+=======
+/// A look becomes a row of the record; of frames on the way the last one waits to become the row "end".
+void Workbench::note_frame(const IntegrateArguments& arguments, const VoxelCounts& counts) {
+  if (arguments.at_view && mapping_views_.size() == mapping_views_.capacity()) return;
+>>>>>>> rep
   MappingViewRecord r;
-  r.phase = sweeping_ ? "sweep" : "explore";
+  r.phase = !arguments.at_view ? "end" : sweeping_ ? "sweep" : "explore";
   r.time_s = arguments.frame.frame.stamp.seconds();
   r.joints_rad = arguments.frame.at_rad;
-  r.gain_expected = expected_gain_;
-  r.gain_seen = gained;
+  r.gain_expected = arguments.at_view ? expected_gain_ : 0;
+  r.gain_seen = unknown_at_view_ > counts.unknown ? unknown_at_view_ - counts.unknown : 0;
   r.unknown = counts.unknown;
   r.free = counts.free;
   r.occupied = counts.occupied;
-  expected_gain_ = 0;
-  mapping_views_.push_back(std::move(r));
+  if (arguments.at_view) {
+    expected_gain_ = 0;
+    unknown_at_view_ = counts.unknown;
+    mapping_views_.push_back(std::move(r));
+    after_views_.reset();
+  } else {
+    after_views_ = std::move(r);
+  }
 }
 
 SummarizeResult Workbench::summarize() {
@@ -100,44 +109,32 @@ VoxelMap Workbench::map_after_sweep() const {
   return swept;
 }
 
-std::vector<Eigen::Vector3d> Workbench::view_positions() const {
-  std::vector<Eigen::Vector3d> positions;
-  if (!hand_eye_) return positions;
-  for (const MappingViewRecord& view : mapping_views_) {
-    positions.push_back((forward(arm_, view.joints_rad).flange() * hand_eye_->flange_T_camera).translation());
-  }
-  return positions;
+std::vector<MappingViewRecord> Workbench::mapping_views() const {
+  std::vector<MappingViewRecord> views = mapping_views_;
+  if (after_views_) views.push_back(*after_views_);
+  return views;
 }
 
-std::vector<RgbPicture> Workbench::map_pictures() const {
-  std::vector<RgbPicture> pictures;
-  if (!mapped()) return pictures;
-  const auto draw = [&pictures](std::string caption, int width, int height, auto paint) {
-    RgbPicture picture;
-    picture.caption = std::move(caption);
-    picture.width = width;
-    picture.height = height;
-    picture.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
-    paint(RgbImage{picture.pixels.data(), width, height});
-    pictures.push_back(std::move(picture));
-  };
-  const auto positions = view_positions();
-  for (const double azimuth : {-2.2, 0.9}) {
-    Viewpoint viewpoint;
-    viewpoint.azimuth_rad = azimuth;
-    draw("the map with the views in order, seen from " + std::string(azimuth < 0 ? "behind" : "the front"), 800, 600,
-         [&](RgbImage image) { draw_map(map_, viewpoint, {}, positions, image); });
+std::vector<CameraPlace> Workbench::camera_places() const {
+  std::vector<CameraPlace> places;
+  if (!hand_eye_) return places;
+  for (const MappingViewRecord& view : mapping_views()) {
+    const auto base_T_camera = forward(arm_, view.joints_rad).flange() * hand_eye_->flange_T_camera;
+    places.push_back({view.phase, base_T_camera.translation(), base_T_camera.rotation().col(2)});
   }
-  const VoxelMap swept = map_after_sweep();
-  draw("after the sweep: what was still unknown in the reach of the arm (veil)", 800, 600,
-       [&](RgbImage image) { draw_map(swept, {}, zone_, {}, image); });
-  draw("at the end: what remains unknown in the reach of the arm (veil)", 800, 600,
-       [&](RgbImage image) { draw_map(map_, {}, zone_, {}, image); });
-  for (const double z : {0.0, 0.25, 0.5}) {
-    draw(fmt::format("layer at {:.2f} m: occupied dark, free light, unknown grey", z), 420, 420,
-         [&](RgbImage image) { draw_slice(map_, z, image); });
-  }
-  return pictures;
+  return places;
+}
+
+std::optional<std::array<Eigen::Vector3d, 4>> Workbench::board_outline_m() const {
+  if (!hand_eye_) return std::nullopt;
+  const double s = board_.square_size_m;
+  const double width = (board_.inner_columns - 1) * s, height = (board_.inner_rows - 1) * s;
+  std::array<Eigen::Vector3d, 4> corners;
+  // The printed squares reach one square beyond the inner corners.
+  const std::array<Eigen::Vector3d, 4> on_board = {
+      {{-s, -s, 0}, {width + s, -s, 0}, {width + s, height + s, 0}, {-s, height + s, 0}}};
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = hand_eye_->base_T_board * on_board[i];
+  return corners;
 }
 
 }  // namespace firstlook

@@ -99,6 +99,7 @@ NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
 
 NextViewResult Workbench::next_sweep_view(const FromHere& here) {
   rebuild_free_space(here.now_s);
+  expected_gain_ = 0;  // what an earlier choice expected says nothing about the next look
   NextViewResult result;
   for (const Pace& pace : mapping_paces()) {
     result = sweep_at(pace, here);
@@ -136,6 +137,7 @@ NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
 NextViewResult Workbench::next_view(const FromHere& here) {
   rebuild_free_space(here.now_s);
   sweeping_ = false;
+  expected_gain_ = 0;
   NextViewResult result;
   const auto paces = mapping_paces();
   for (std::size_t i = 0; i < paces.size(); ++i) {

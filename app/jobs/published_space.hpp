@@ -69,8 +69,6 @@ class PublishedSpace {
   [[nodiscard]] bool free_for_motion(std::size_t voxel) const { return free_[voxel] == kFreeVoxel; }
   [[nodiscard]] bool zone_revoked(std::size_t voxel) const { return free_[voxel] == kRevokedVoxel; }
   [[nodiscard]] const FreeSpace& space() const { return space_; }
-  /// What the guardian requires at least, whatever limits the body: its margins are beyond this.
-  [[nodiscard]] double required_m() const { return std::min(clearance_.voxels_m, clearance_.surface_m); }
 
  private:
   std::mutex mutex_;

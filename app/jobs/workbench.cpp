@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "algorithms/mapping/map_image.hpp"
 #include "algorithms/mapping/reach_zone.hpp"
 
 namespace firstlook {
@@ -96,6 +95,8 @@ Status Workbench::take_memory() {
   };
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
+  const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
+  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * sizeof(Eigen::Vector2d);
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,
@@ -103,6 +104,9 @@ Status Workbench::take_memory() {
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
            std::pair{memory::Pool::kViewCandidates, ViewChooser::required_bytes(g, config_.explore.candidates, 2,
                                                                                 config_.explore.certificate_samples)},
+           std::pair{memory::Pool::kPlannerNodes, 2 * Planner::required_bytes()},  // ours and the chooser's
+           std::pair{memory::Pool::kCalibrationViews, views * view},
+           std::pair{memory::Pool::kApplication, sizeof(Workbench) + kViewRecordsMax * sizeof(MappingViewRecord)},
        }) {
     if (const Status status = account(pool, bytes); !status) return status;
   }
@@ -162,7 +166,7 @@ void Workbench::begin_mapping() {
   clearance_in_force_ = mapping_terms_->clearance();
   camera_body_ = body_with_camera(arm_, hand_eye_->flange_T_camera);
   mark_reach_zone(map_.geometry(), arm_, camera_body_.capsules, kZoneMargin_m, config_.map.low_m[2], zone_);
-  unknown_before_ = zone_counts().unknown;
+  unknown_before_ = unknown_at_view_ = zone_counts().unknown;
   rebuild_free_space(last_stamp_s_);
 }
 

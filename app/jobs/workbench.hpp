@@ -2,6 +2,7 @@
 /// run one after the other, so nothing here is locked; what the loop thread needs is published (published_space.hpp).
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "app/config/config.hpp"
 #include "app/jobs/published_space.hpp"
 #include "app/machine/job_types.hpp"
+#include "app/report/map_pictures.hpp"
 #include "app/report/run_record.hpp"
 #include "hal/api/cameras.hpp"
 #include "platform/loop/worker_pool.hpp"
@@ -71,17 +73,22 @@ class Workbench {
   [[nodiscard]] const std::optional<HandEyeResult>& hand_eye() const { return hand_eye_; }
   [[nodiscard]] const std::optional<ClearanceTerms>& clearance_terms() const { return mapping_terms_; }
   [[nodiscard]] std::vector<CalibrationViewRecord> calibration_records() const;
-  [[nodiscard]] const std::vector<MappingViewRecord>& mapping_views() const { return mapping_views_; }
+  /// With the row "end" when frames went into the map after the last look.
+  [[nodiscard]] std::vector<MappingViewRecord> mapping_views() const;
+  /// Voxels of the reach zone.
+  [[nodiscard]] VoxelCounts zone_counts() const;
   [[nodiscard]] const std::vector<RemainingRecord>& remaining() const { return remaining_; }
   [[nodiscard]] const VoxelMap& map() const { return map_; }
+  [[nodiscard]] bool swept() const { return !sweeping_; }
   /// The classes of the map as the sweep left it; all unknown when the sweep did not end.
   [[nodiscard]] VoxelMap map_after_sweep() const;
   [[nodiscard]] std::span<const std::uint8_t> zone() const { return zone_; }
   [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
   [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
   [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
-  [[nodiscard]] std::vector<Eigen::Vector3d> view_positions() const;
-  [[nodiscard]] std::vector<RgbPicture> map_pictures() const;
+  /// Where the camera stood at each of `mapping_views()`; the outermost corners of the board. For pictures.
+  [[nodiscard]] std::vector<CameraPlace> camera_places() const;
+  [[nodiscard]] std::optional<std::array<Eigen::Vector3d, 4>> board_outline_m() const;
   [[nodiscard]] const ArmModel& arm() const { return arm_; }
   [[nodiscard]] PublishedSpace& published() { return published_; }
   [[nodiscard]] double last_stamp_s() const { return last_stamp_s_; }
@@ -123,8 +130,7 @@ class Workbench {
   [[nodiscard]] bool is_frozen(const hal::Frame& frame, IntegrateResult& result);
   void begin_mapping();
   void rebuild_free_space(double now_s);
-  void note_view(const IntegrateArguments& arguments, std::uint64_t gained);
-  [[nodiscard]] VoxelCounts zone_counts() const;
+  void note_frame(const IntegrateArguments& arguments, const VoxelCounts& counts);
   void take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace);
 
   Config config_;
@@ -176,8 +182,10 @@ class Workbench {
   double expected_gain_ = 0;
   std::uint64_t frames_integrated_ = 0;
   std::uint64_t frames_dropped_ = 0;
-  std::uint64_t unknown_before_ = 0;
+  std::uint64_t unknown_before_ = 0;   ///< the last frame
+  std::uint64_t unknown_at_view_ = 0;  ///< after the last view
   std::vector<MappingViewRecord> mapping_views_;
+  std::optional<MappingViewRecord> after_views_;  ///< the last frame, when it was none of a view
   std::vector<RemainingRecord> remaining_;
 };
 

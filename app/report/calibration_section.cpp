@@ -5,7 +5,7 @@
 
 #include "app/report/charts.hpp"
 #include "app/report/html.hpp"
-#include "app/report/png.hpp"
+#include "app/report/picture_bytes.hpp"
 #include "app/report/ros_files.hpp"
 #include "app/report/sections.hpp"
 
@@ -29,6 +29,11 @@ std::string transform_table(const HandEyeResult& h) {
   return table.html();
 }
 
+/// A figure of the validation, or that there was none.
+std::string validated(const HandEyeResult& h, std::string text) {
+  return h.holdout_rms_m > 0 ? std::move(text) : std::string("not determined");
+}
+
 std::string quality_table(const RunRecord& record) {
   const HandEyeResult& h = *record.hand_eye;
   HtmlTable table({"figure", "value", "what it says"}, 3);
@@ -36,10 +41,11 @@ std::string quality_table(const RunRecord& record) {
     table.row(
         {"reprojection error", fmt::format("{:.3f} px RMS", h.reprojection_rms_px),
          "how well the views fit once each is granted a deviation of the arm; small is necessary, not sufficient"});
-    table.row({"held-out reprojection error", fmt::format("{:.3f} px RMS", h.holdout_rms_px),
-               "in views left out of the solve in turn, the arm's own error included"});
+    table.row({"held-out reprojection error", validated(h, fmt::format("{:.3f} px RMS", h.holdout_rms_px)),
+               "each view predicted by a solve without it (every fifth view left out at a time), the arm's own error "
+               "included"});
   }
-  table.row({"held-out board position", fmt::format("{:.2f} mm RMS", h.holdout_rms_m * 1e3),
+  table.row({"held-out board position", validated(h, fmt::format("{:.2f} mm RMS", h.holdout_rms_m * 1e3)),
              "where the other views put the board against where this one sees it"});
   table.row({"spread over subsets",
              fmt::format("{:.2f} mm, {:.2f} mrad", h.subset_spread_m * 1e3, h.subset_spread_rad * 1e3),
@@ -67,9 +73,15 @@ std::string snippets(const HandEyeResult& h) {
           escape_html("flange_T_camera = " + ur_pose_text(h.flange_T_camera)) + "</pre>\n";
   html +=
       "<p>easy_handeye2: copy <code>ros/easy_handeye2.calib</code> to "
-      "<code>~/.ros2/easy_handeye2/calibrations/firstlook.calib</code>; easy_handeye (ROS 1): "
-      "<code>ros/easy_handeye.yaml</code> to <code>~/.ros/easy_handeye/</code>. For a robot description, include "
-      "<code>ros/camera.xacro</code>.</p>\n"
+      "<code>~/.ros2/easy_handeye2/calibrations/firstlook.calib</code>, then <code>ros2 launch easy_handeye2 "
+      "publish.launch.py name:=firstlook</code>. easy_handeye (ROS 1): <code>ros/easy_handeye.yaml</code> to "
+      "<code>~/.ros/easy_handeye/firstlook_eye_on_hand.yaml</code>, then <code>roslaunch easy_handeye publish.launch "
+      "eye_on_hand:=true namespace_prefix:=firstlook</code>. In a robot description: include "
+      "<code>ros/camera.xacro</code> and call <code>&lt;xacro:firstlook_camera/&gt;</code>. Publish the transform in "
+      "one "
+      "of these ways only, and not when the camera's own driver publishes a parent of "
+      "<code>camera_color_optical_frame</code>: then take the xacro, whose <code>camera_link</code> is that "
+      "parent.</p>\n"
       "<p class=\"hint\">Mind the base: the controller's <code>base</code> (pendant, map files) and ROS "
       "<code>base_link</code> share their origin but are turned by 180° about z. The camera's pose in the flange is "
       "the "
@@ -77,14 +89,13 @@ std::string snippets(const HandEyeResult& h) {
   return html;
 }
 
-/// The picture for the page: small, and with 64 grey levels, so that sensor noise does not fill the file.
+/// The picture for the page.
 std::string picture_base64(const GrayPicture& whole, int width_max, CornerPicture& out) {
   double scale = 1;
-  GrayPicture small = shrink(whole, width_max, scale);
-  for (std::uint8_t& pixel : small.pixels) pixel = static_cast<std::uint8_t>(pixel & 0xFC);
-  out.picture_width = small.width / scale;
-  out.picture_height = small.height / scale;
-  return base64(encode_png(small));
+  const GrayPicture shown = shrink(whole, width_max, scale);
+  out.picture_width = shown.width / scale;
+  out.picture_height = shown.height / scale;
+  return base64(encode_jpeg(shown));
 }
 
 bool is_whole(const GrayPicture& p) {
@@ -98,7 +109,7 @@ std::string view_figure(const CalibrationViewRecord& view, std::size_t number, c
   if (is_whole(view.picture)) {
     picture.width = view.picture.width;
     picture.height = view.picture.height;
-    picture.png_base64 = picture_base64(view.picture, width_max, picture);
+    picture.jpeg_base64 = picture_base64(view.picture, width_max, picture);
   }
   const Eigen::Vector3d flange = view.base_T_flange.translation();
   return fmt::format(
@@ -107,7 +118,9 @@ std::string view_figure(const CalibrationViewRecord& view, std::size_t number, c
       "<a class=\"close\" href=\"#calibration-views\">close</a></figure>\n",
       number, corner_picture(view, picture),
       view.reprojected_px.empty() ? std::string("not solved") : fmt::format("{:.3f} px", view.rms_px),
-      view.held_out ? " · held out" : "", view.time_s, flange.x(), flange.y(), flange.z());
+      view.used ? (view.holdout_px ? fmt::format(" · held out {:.3f} px", *view.holdout_px) : std::string())
+                : std::string(" · left out as wrong"),
+      view.time_s, flange.x(), flange.y(), flange.z());
 }
 
 }  // namespace
@@ -132,11 +145,10 @@ std::string calibration_views_section(const RunRecord& record) {
       "<p class=\"hint\"><span class=\"key detected\">○</span> detected corners, <span class=\"key "
       "reprojected\">+</span> "
       "corners as the calibration predicts them from where the arm says it stood. The solve grants each view a small "
-      "deviation of the arm, so these figures are larger than its own reprojection error. Select a picture to enlarge "
-      "it.</p>\n<div class=\"shots\">\n";
-  // Fewer pixels for each picture when there are many of them, so that the page stays below some 3 MB.
-  const int width_max = views.size() <= 24 ? 320 : 240;
-  for (std::size_t i = 0; i < views.size(); ++i) body += view_figure(views[i], i + 1, record.intrinsics, width_max);
+      "deviation of the arm, so these figures are larger than its own reprojection error. Held out is the same figure "
+      "under a solve without this view. Select a picture to enlarge it.</p>\n<div class=\"shots\">\n";
+  constexpr int kWidthMax = 640;  // about 25 kB each: the page stays below some 3 MB with 60 of them
+  for (std::size_t i = 0; i < views.size(); ++i) body += view_figure(views[i], i + 1, record.intrinsics, kWidthMax);
   return section("calibration-views", "Views of the board", body + "</div>\n");
 }
 

@@ -143,29 +143,35 @@ std::string voxel_chart(std::span<const MappingViewRecord> views) {
 std::string view_rms_chart(std::span<const CalibrationViewRecord> views) {
   if (views.empty()) return {};
   double top = 0.01;
-  for (const CalibrationViewRecord& view : views) top = std::max(top, view.rms_px);
+  bool held_out = false;
+  for (const CalibrationViewRecord& view : views) {
+    top = std::max({top, view.rms_px, view.holdout_px.value_or(0)});
+    held_out = held_out || view.holdout_px;
+  }
   const double step = nice_step(top, 4);
   const Plot plot{
       48, 26, 430, 200, 0.5, static_cast<double>(views.size()) + 0.5, step * std::ceil(top / step * 0.9999)};
   std::string svg = svg_open(490, 270, "Reprojection error of each calibration view");
   svg += axis_y(plot, step, [](double v) { return fmt::format("{:.3g}", v); });
   const double slot = plot.width / static_cast<double>(views.size());
+  const auto bar = [&](double x, double width, double value, std::string_view colour) {
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" rx=\"2\" fill=\"{}\"/>\n", x,
+                       plot.y(value), width, plot.bottom() - plot.y(value), colour);
+  };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const double x = plot.x(static_cast<double>(i) + 1);
-    const double y = plot.y(views[i].rms_px);
-    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" rx=\"2\" fill=\"{}\"/>\n",
-                       x - slot * 0.36, y, slot * 0.72, plot.bottom() - y, views[i].held_out ? kOrange : kBlue);
+    bar(x - slot * 0.4, slot * (held_out ? 0.4 : 0.8), views[i].rms_px, views[i].used ? kBlue : kGrey);
+    if (views[i].holdout_px) bar(x, slot * 0.4, *views[i].holdout_px, kOrange);
     if (views.size() <= 20 || (i + 1) % 5 == 0)
       svg += text_at(x, plot.bottom() + 17, "middle", fmt::format("{}", i + 1));
   }
   svg += text_at(plot.left + plot.width / 2, plot.bottom() + 36, "middle", "calibration view", "class=\"note\"");
   svg += text_at(4, 14, "start", "RMS, px", "class=\"note\"");
-  const bool any_held_out = std::any_of(views.begin(), views.end(), [](const auto& v) { return v.held_out; });
-  if (any_held_out) {
-    svg += fmt::format("<rect x=\"300\" y=\"4\" width=\"11\" height=\"11\" fill=\"{}\"/>", kBlue) +
-           text_at(316, 14, "start", "in the solve");
-    svg += fmt::format("<rect x=\"400\" y=\"4\" width=\"11\" height=\"11\" fill=\"{}\"/>", kOrange) +
-           text_at(416, 14, "start", "held out");
+  if (held_out) {
+    svg += fmt::format("<rect x=\"200\" y=\"4\" width=\"11\" height=\"11\" fill=\"{}\"/>", kBlue) +
+           text_at(216, 14, "start", "solved with it");
+    svg += fmt::format("<rect x=\"320\" y=\"4\" width=\"11\" height=\"11\" fill=\"{}\"/>", kOrange) +
+           text_at(336, 14, "start", "solved without it");
   }
   return svg + "</svg>\n";
 }
@@ -174,7 +180,7 @@ std::string residual_chart(std::span<const CalibrationViewRecord> views) {
   std::vector<Eigen::Vector2d> residuals;
   std::vector<double> lengths;
   for (const CalibrationViewRecord& view : views) {
-    if (view.held_out) continue;
+    if (!view.used) continue;
     for (std::size_t i = 0; i < std::min(view.detected_px.size(), view.reprojected_px.size()); ++i) {
       const Eigen::Vector2d r = view.detected_px[i] - view.reprojected_px[i];
       if (!r.allFinite()) continue;
@@ -249,19 +255,25 @@ std::string memory_chart(const MemoryRecord& memory) {
   std::uint64_t top = 1;
   for (const PoolRecord& pool : rows) top = std::max({top, pool.reserved_bytes, pool.peak_bytes});
   const double row = 24;
-  const Plot plot{190, 6, 360, row * static_cast<double>(rows.size()), 0, static_cast<double>(top), 1};
+  const Plot plot{190, 6, 340, row * static_cast<double>(rows.size()), 0, static_cast<double>(top), 1};
   std::string svg = svg_open(760, plot.bottom() + 10, "Memory reserved and used");
   for (std::size_t i = 0; i < rows.size(); ++i) {
+    const PoolRecord& pool = rows[i];
     const double y = plot.top + row * static_cast<double>(i);
     const auto bar = [&](std::uint64_t bytes, std::string_view colour) {
       svg += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" rx=\"3\" fill=\"{}\"/>\n",
                          plot.left, y + 5, plot.x(static_cast<double>(bytes)) - plot.left, colour);
     };
-    svg += text_at(plot.left - 8, y + 16, "end", rows[i].name);
-    bar(rows[i].reserved_bytes, "#d7dde5");
-    bar(rows[i].peak_bytes, rows[i].peak_bytes > rows[i].reserved_bytes ? kOrange : kGreen);
+    svg += text_at(plot.left - 8, y + 16, "end", pool.name);
+    bar(pool.reserved_bytes, "#d7dde5");
+    if (pool.declared) {
+      bar(pool.peak_bytes, "#9aa5b1");
+      svg += text_at(plot.right() + 10, y + 16, "start", fmt::format("{}, declared", mib_text(pool.reserved_bytes)));
+      continue;
+    }
+    bar(pool.peak_bytes, pool.peak_bytes > pool.reserved_bytes ? kOrange : kGreen);
     svg += text_at(plot.right() + 10, y + 16, "start",
-                   fmt::format("{} of {}", mib_text(rows[i].peak_bytes), mib_text(rows[i].reserved_bytes)));
+                   fmt::format("{} of {}", mib_text(pool.peak_bytes), mib_text(pool.reserved_bytes)));
   }
   return svg + "</svg>\n";
 }
@@ -273,11 +285,11 @@ std::string corner_picture(const CalibrationViewRecord& view, const CornerPictur
                   picture.width, picture.height);
   svg += fmt::format("<rect x=\"-0.5\" y=\"-0.5\" width=\"{}\" height=\"{}\" fill=\"#2b3038\"/>\n", picture.width,
                      picture.height);
-  if (!picture.png_base64.empty()) {
+  if (!picture.jpeg_base64.empty()) {
     svg += fmt::format(
         "<image x=\"-0.5\" y=\"-0.5\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" "
-        "href=\"data:image/png;base64,{}\"/>\n",
-        picture.picture_width, picture.picture_height, picture.png_base64);
+        "href=\"data:image/jpeg;base64,{}\"/>\n",
+        picture.picture_width, picture.picture_height, picture.jpeg_base64);
   }
   std::string rings, crosses;
   for (const Eigen::Vector2d& p : view.detected_px) {

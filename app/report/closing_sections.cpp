@@ -11,6 +11,11 @@ std::string memory_section(const RunRecord& record) {
   std::string body = "<div class=\"figure\">\n" + memory_chart(*record.memory) + "</div>\n";
   body += paragraph(
       fmt::format("Allocations of the loop after it was sealed: {}.", record.memory->loop_allocations_after_seal));
+  body +=
+      "<p class=\"hint\">Green rows are counted as they are taken, and shown at their peak. Grey rows are declared: "
+      "they "
+      "count whole, so that the peak is the same on every machine; what was measured of them stands in the last "
+      "section.</p>\n";
   return section("memory", "Memory", body);
 }
 
@@ -37,8 +42,14 @@ std::string wall_section(const RunRecord& record) {
   HtmlTable table({"", ""}, 2);
   table.row({"started (UTC)", w.started});
   table.row({"took", duration_text(w.total_s)});
-  table.row({"time of the job in which the arm waited for the computer", duration_text(w.stall_s)});
-  table.row({"resident memory", mib_text(w.rss_bytes)});
+  table.row({"time of the job in which the arm stood and waited for the computer",
+             duration_text(w.stall_s) + (w.real_time ? ", measured"
+                                                     : ", by the declared durations of the jobs: the clock is virtual "
+                                                       "(--real-time measures)")});
+  table.row({"resident memory, simulated cell included", mib_text(w.rss_bytes)});
+  table.row({"of it program and shared libraries", mib_text(w.library_bytes)});
+  table.row({"heap that boot took, all counted rows together, measured", mib_text(w.boot_heap_bytes)});
+  table.row({"largest heap of a job, measured", mib_text(w.job_heap_peak_bytes)});
   table.row({"workers", fmt::format("{}", w.workers)});
   table.row({"folder", w.folder});
   return section(

@@ -1,6 +1,7 @@
 #include "app/report/hand_eye_json.hpp"
 
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace firstlook {
 namespace {
@@ -36,6 +37,11 @@ json only_with_corners(const HandEyeResult& result, double value) {
   return result.from_pairs ? json(nullptr) : json(value);
 }
 
+/// A figure of the validation; none when the job ended before it, or when there were too few views to hold any out.
+json only_validated(const HandEyeResult& result, json value) {
+  return result.holdout_rms_m > 0 ? std::move(value) : json(nullptr);
+}
+
 }  // namespace
 
 json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, std::string_view solver) {
@@ -45,11 +51,12 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
   object["sigma_rotation_mrad"] = array_of(Eigen::Vector3d(result.sigma_rotation_rad * 1e3));
   object["covariance"] = row_major(result.covariance);
   object["reprojection_rms_px"] = only_with_corners(result, result.reprojection_rms_px);
-  object["holdout_rms_px"] = only_with_corners(result, result.holdout_rms_px);
-  object["holdout_rms_mm"] = result.holdout_rms_m * 1e3;
+  object["holdout_rms_px"] = only_validated(result, only_with_corners(result, result.holdout_rms_px));
+  object["holdout_rms_mm"] = only_validated(result, result.holdout_rms_m * 1e3);
   object["views"] = result.views;
   object["views_given"] = result.fits.size();
-  object["usable_distance_m"] = result.usable_distance_m;
+  object["usable_distance_m"] =
+      result.usable_distance_m > 0 ? json(result.usable_distance_m) : only_validated(result, 0.0);
   object["verdict"] = result.verdict == Verdict::kAccepted ? "accepted" : "rejected";
   object["reasons"] = result.reasons;
   object["solver"] = solver;

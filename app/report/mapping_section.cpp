@@ -4,12 +4,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include "app/report/charts.hpp"
 #include "app/report/html.hpp"
-#include "app/report/png.hpp"
+#include "app/report/map_figures.hpp"
 #include "app/report/sections.hpp"
 
 namespace firstlook {
@@ -22,41 +21,29 @@ std::string litres(std::uint64_t voxels, double resolution_m) {
 }
 
 std::string counts_table(const MappingRecord& m) {
-  const double total =
-      static_cast<double>(std::max<std::size_t>(1, m.voxels.unknown + m.voxels.free + m.voxels.occupied));
-  HtmlTable table({"class", "voxels", "litres", "share"}, 1);
-  const auto row = [&](std::string name, std::size_t count) {
-    table.row({std::move(name), grouped(count), litres(count, m.resolution_m),
-               fmt::format("{:.1f} %", 100 * static_cast<double>(count) / total)});
+  HtmlTable table({"class", "in the reach of the arm", "litres", "share", "in the whole grid", "litres", "share"}, 1);
+  const auto share = [](std::size_t count, const VoxelCounts& v) {
+    const double total = static_cast<double>(std::max<std::size_t>(1, v.unknown + v.free + v.occupied));
+    return fmt::format("{:.1f} %", 100 * static_cast<double>(count) / total);
   };
-  row("free", m.voxels.free);
-  row("occupied", m.voxels.occupied);
-  row("unknown", m.voxels.unknown);
+  const auto row = [&](std::string name, std::size_t VoxelCounts::* count) {
+    const std::size_t zone = m.voxels.*count, grid = m.grid_voxels.*count;
+    table.row({std::move(name), grouped(zone), litres(zone, m.resolution_m), share(zone, m.voxels), grouped(grid),
+               litres(grid, m.resolution_m), share(grid, m.grid_voxels)});
+  };
+  row("free", &VoxelCounts::free);
+  row("occupied", &VoxelCounts::occupied);
+  row("unknown", &VoxelCounts::unknown);
   return table.html();
 }
 
-/// Landscape pictures two abreast, square ones (layers) three abreast below them.
-std::string map_pictures(const std::vector<RgbPicture>& pictures) {
-  std::string maps, layers;
-  int number = 0;
-  for (const RgbPicture& picture : pictures) {
-    const std::vector<std::byte> png = encode_png(picture);
-    if (png.empty()) continue;
-    ++number;
-    (picture.width > picture.height ? maps : layers) += fmt::format(
-        "<figure class=\"shot\" id=\"map{0}\"><a href=\"#map{0}\"><img alt=\"{1}\" width=\"{2}\" height=\"{3}\" "
-        "src=\"data:image/png;base64,{4}\"></a><figcaption>{1}</figcaption><a class=\"close\" "
-        "href=\"#map\">close</a></figure>\n",
-        number, escape_html(picture.caption), picture.width, picture.height, base64(png));
-  }
-  std::string html;
-  if (!maps.empty()) html += "<div class=\"maps\">\n" + maps + "</div>\n";
-  if (!layers.empty()) {
-    html += "<div class=\"layers\">\n" + layers +
-            "</div>\n<p class=\"hint\">Layers are seen from above: base x to the right, y up.</p>\n";
-  }
-  return html;
-}
+constexpr std::string_view kMapLegend =
+    "<p class=\"hint\"><span class=\"dot sweep\"></span> views of the sweep, <span class=\"dot explore\"></span> of "
+    "the "
+    "exploration, joined in order; occupied voxels in the colours of their height; <span class=\"dot unknown\"></span> "
+    "unknown in the reach of the arm. In layers: occupied dark, free light, unknown out of reach grey. Lines on the "
+    "floor "
+    "every 0.5 m; axes of the controller's <code>base</code>. Select a picture to enlarge it.</p>\n";
 
 /// The words of result.json as a person says them; any other text stays as it is.
 std::string reason_text(const std::string& reason) {
@@ -104,10 +91,13 @@ std::vector<ReasonSum> sums_by_reason(const std::vector<RemainingRecord>& remain
 std::string map_section(const RunRecord& record) {
   if (!record.mapping) return section("map", "The map", paragraph("Nothing was mapped in this run."));
   const MappingRecord& m = *record.mapping;
-  std::string body = map_pictures(record.map_pictures);
+  std::string body;
+  if (const std::string figures = map_figures(record.map_pictures); !figures.empty()) {
+    body += std::string(kMapLegend) + figures;
+  }
   body +=
       "<h3>In the reach of the arm, view by view</h3>\n<div class=\"figure\">\n" + voxel_chart(m.views) + "</div>\n";
-  body += "<h3>The whole map at the end</h3>\n" + counts_table(m);
+  body += "<h3>At the end</h3>\n" + counts_table(m);
   body += fmt::format(
       "<p class=\"hint\">Voxels of {:.0f} mm. {} depth frames went into the map; {} were dropped because their pose or "
       "stamp could not be trusted.</p>\n",
@@ -121,28 +111,22 @@ std::string map_section(const RunRecord& record) {
 
 std::string mapping_views_section(const RunRecord& record) {
   if (!record.mapping || record.mapping->views.empty()) return {};
-  HtmlTable table({"view", "phase", "time", "joints, degrees", "gain expected", "learnt", "unknown left"}, 4);
+  HtmlTable table({"view", "phase", "time", "joints, degrees", "gain expected", "gain seen", "unknown left"}, 4);
   int number = 0;
-  std::optional<std::uint64_t> unknown_before;
   for (const MappingViewRecord& view : record.mapping->views) {
-    const auto learnt = unknown_before
-                            ? static_cast<std::int64_t>(*unknown_before) - static_cast<std::int64_t>(view.unknown)
-                            : static_cast<std::int64_t>(view.gain_seen);
-    unknown_before = view.unknown;
     table.row({fmt::format("{}", ++number), view.phase, duration_text(view.time_s), joints_text(view.joints_rad),
                view.gain_expected > 0
                    ? grouped(static_cast<std::uint64_t>(std::llround(std::min(view.gain_expected, 1e12))))
                    : std::string("–"),
-               learnt < 0 ? fmt::format("-{}", grouped(static_cast<std::uint64_t>(-learnt)))
-                          : grouped(static_cast<std::uint64_t>(learnt)),
-               grouped(view.unknown)});
+               grouped(view.gain_seen), grouped(view.unknown)});
   }
   return section(
       "views", "The views in order",
       table.html("dense") +
-          "<p class=\"hint\">Voxels in the reach of the arm. Expected is what the view itself was thought to show when "
-          "it was chosen; learnt is by how much the unknown ones became fewer since the row above, on the "
-          "way there and at the view.</p>\n");
+          "<p class=\"hint\">Voxels in the reach of the arm. Expected is how many unknown ones the view was thought to "
+          "reach when it was chosen, were nothing hidden behind other unknown ones; seen is by how much the unknown "
+          "ones became fewer since the row above, on the way there and at the view. A last row \"end\" is the last "
+          "frame on the way to where the arm stopped.</p>\n");
 }
 
 std::string remaining_section(const RunRecord& record) {

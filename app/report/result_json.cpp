@@ -23,15 +23,22 @@ Json phases_json(const RunRecord& record) {
   return phases;
 }
 
+Json counts_json(const VoxelCounts& counts) {
+  return {{"unknown", counts.unknown}, {"free", counts.free}, {"occupied", counts.occupied}};
+}
+
 Json mapping_json(const MappingRecord& mapping) {
   Json remaining = Json::array();
   for (const RemainingRecord& cluster : mapping.remaining) {
-    remaining.push_back({{"voxels", cluster.voxels}, {"reason", cluster.reason}});
+    remaining.push_back({{"voxels", cluster.voxels},
+                         {"reason", cluster.reason},
+                         {"center_m", {cluster.center_m.x(), cluster.center_m.y(), cluster.center_m.z()}}});
   }
   return {{"views", mapping.views.size()},
           {"resolution_m", mapping.resolution_m},
-          {"voxels",
-           {{"unknown", mapping.voxels.unknown}, {"free", mapping.voxels.free}, {"occupied", mapping.voxels.occupied}}},
+          {"voxels", counts_json(mapping.voxels)},
+          {"grid_voxels", counts_json(mapping.grid_voxels)},
+          {"frames", {{"integrated", mapping.frames_integrated}, {"dropped", mapping.frames_dropped}}},
           {"remaining", remaining}};
 }
 
@@ -39,7 +46,9 @@ Json safety_json(const SafetyRecord& safety) {
   Json stops = Json::array();
   for (const StopRecord& stop : safety.stops) stops.push_back({{"time_s", stop.time_s}, {"cause", stop.cause}});
   return {{"clearance_m", safety.clearance ? Json(safety.clearance->voxels_m) : Json(nullptr)},
-          {"min_clearance_m", or_null(safety.min_clearance_m)},
+          {"min_clearance_m", or_null(safety.min_clearance_m())},
+          {"min_clearance_calibrating_m", or_null(safety.min_clearance_calibrating_m)},
+          {"min_clearance_mapping_m", or_null(safety.min_clearance_mapping_m)},
           {"stops", stops}};
 }
 
@@ -50,8 +59,16 @@ Json memory_json(const MemoryRecord& memory) {
 }
 
 Json wall_json(const WallRecord& wall) {
-  return {{"started", wall.started},     {"total_s", wall.total_s}, {"stall_s", wall.stall_s},
-          {"rss_bytes", wall.rss_bytes}, {"folder", wall.folder},   {"workers", wall.workers}};
+  return {{"started", wall.started},
+          {"total_s", wall.total_s},
+          {"stall_s", wall.stall_s},
+          {"real_time", wall.real_time},
+          {"rss_bytes", wall.rss_bytes},
+          {"boot_heap_bytes", wall.boot_heap_bytes},
+          {"job_heap_peak_bytes", wall.job_heap_peak_bytes},
+          {"library_bytes", wall.library_bytes},
+          {"folder", wall.folder},
+          {"workers", wall.workers}};
 }
 
 Json truth_json(const TruthRecord& truth) {

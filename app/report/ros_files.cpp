@@ -25,39 +25,37 @@ Numbers numbers_of(const Transform<Flange, Camera>& transform) {
   return {plain(t.x()), plain(t.y()), plain(t.z()), plain(q.x()), plain(q.y()), plain(q.z()), plain(q.w())};
 }
 
-std::string easy_handeye_yaml(const Numbers& n) {
+/// What both generations of easy_handeye keep beside the transform. Without `freehand_robot_movement`: the first does
+/// not know it in all its versions and refuses keys that it does not know; in the second it is false unless said.
+std::string easy_handeye_parameters(std::string_view head) {
   return fmt::format(
       "parameters:\n"
-      "  eye_on_hand: true\n"
-      "  namespace: firstlook\n"
+      "{}"
       "  robot_base_frame: base_link\n"
       "  robot_effector_frame: {}\n"
       "  tracking_base_frame: {}\n"
       "  tracking_marker_frame: board\n"
-      "  freehand_robot_movement: false\n"
       "  move_group_namespace: /\n"
-      "  move_group: manipulator\n"
-      "transformation:\n"
-      "  x: {:.10f}\n  y: {:.10f}\n  z: {:.10f}\n  qx: {:.10f}\n  qy: {:.10f}\n  qz: {:.10f}\n  qw: {:.10f}\n",
-      kFlangeFrame, kCameraFrame, n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw);
+      "  move_group: manipulator\n",
+      head, kFlangeFrame, kCameraFrame);
+}
+
+/// easy_handeye finds a calibration by the last part of its namespace, and `eye_on_hand` adds the ending.
+std::string easy_handeye_yaml(const Numbers& n) {
+  return easy_handeye_parameters("  eye_on_hand: true\n  namespace: /firstlook_eye_on_hand/\n") +
+         fmt::format(
+             "transformation:\n"
+             "  x: {:.10f}\n  y: {:.10f}\n  z: {:.10f}\n  qx: {:.10f}\n  qy: {:.10f}\n  qz: {:.10f}\n  qw: {:.10f}\n",
+             n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw);
 }
 
 std::string easy_handeye2_calib(const Numbers& n) {
-  return fmt::format(
-      "parameters:\n"
-      "  name: firstlook\n"
-      "  calibration_type: eye_in_hand\n"
-      "  robot_base_frame: base_link\n"
-      "  robot_effector_frame: {}\n"
-      "  tracking_base_frame: {}\n"
-      "  tracking_marker_frame: board\n"
-      "  freehand_robot_movement: false\n"
-      "  move_group_namespace: /\n"
-      "  move_group: manipulator\n"
-      "transform:\n"
-      "  translation:\n    x: {:.10f}\n    y: {:.10f}\n    z: {:.10f}\n"
-      "  rotation:\n    x: {:.10f}\n    y: {:.10f}\n    z: {:.10f}\n    w: {:.10f}\n",
-      kFlangeFrame, kCameraFrame, n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw);
+  return easy_handeye_parameters("  name: firstlook\n  calibration_type: eye_in_hand\n") +
+         fmt::format(
+             "transform:\n"
+             "  translation:\n    x: {:.10f}\n    y: {:.10f}\n    z: {:.10f}\n"
+             "  rotation:\n    x: {:.10f}\n    y: {:.10f}\n    z: {:.10f}\n    w: {:.10f}\n",
+             n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw);
 }
 
 std::string ros1_launch(const Numbers& n) {

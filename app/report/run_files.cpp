@@ -19,6 +19,7 @@ std::string hand_eye_yaml(const HandEyeResult& result) {
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   const Eigen::Vector3d sigma_mm = result.sigma_translation_m * 1e3;
   const Eigen::Vector3d sigma_mrad = result.sigma_rotation_rad * 1e3;
+  const std::string holdout_px = result.holdout_rms_m > 0 ? fmt::format("{}", result.holdout_rms_px) : "null";
   std::string covariance;
   for (int i = 0; i < 6; ++i) {
     covariance += i == 0 ? "\n  [" : ",\n   ";
@@ -41,8 +42,7 @@ std::string hand_eye_yaml(const HandEyeResult& result) {
       "usable_distance_m: {}\n",
       result.verdict == Verdict::kAccepted ? "accepted" : "rejected", kFlangeFrame, kCameraFrame, t.x(), t.y(), t.z(),
       q.x(), q.y(), q.z(), q.w(), sigma_mm.x(), sigma_mm.y(), sigma_mm.z(), sigma_mrad.x(), sigma_mrad.y(),
-      sigma_mrad.z(), covariance, result.views, result.reprojection_rms_px, result.holdout_rms_px,
-      result.usable_distance_m);
+      sigma_mrad.z(), covariance, result.views, result.reprojection_rms_px, holdout_px, result.usable_distance_m);
 }
 
 /// A rejected calibration stays readable in hand_eye.yaml, but nothing that a robot would load is made of it.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -34,6 +35,35 @@ struct RgbPicture {
   std::vector<std::uint8_t> pixels;
 };
 
+/// A picture of the map and what is drawn upon it; places in px of the picture, (0, 0) the centre of its upper left
+/// pixel.
+struct MapPicture {
+  enum class Layout : std::uint8_t { kWide, kPair, kHalf };
+  struct Line {
+    std::string style;  ///< class of the page's style sheet; a word of ours, not data
+    std::vector<Eigen::Vector2d> points_px;
+  };
+  struct Label {
+    std::string style, text;
+    Eigen::Vector2d at_px = Eigen::Vector2d::Zero();  ///< middle of the text
+  };
+  /// A place of the camera.
+  struct View {
+    std::string style;  ///< by phase
+    Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
+    std::optional<Eigen::Vector2d> number_px;  ///< where its number stands; empty: it has none
+    int number = 0;
+  };
+  RgbPicture picture;
+  std::string group;              ///< pictures that follow each other with the same group stand side by side under it
+  Layout layout = Layout::kPair;  ///< kWide: one over the page; kPair: two; kHalf: two in half of it
+  std::vector<Line> lines;
+  std::vector<Label> labels;
+  std::vector<View> views;
+  std::optional<std::array<double, 2>> heights_m;  ///< a scale of the colours from the lowest to the highest voxel
+  double text_px = 18;
+};
+
 struct PhaseRecord {
   std::string name;
   double start_s = 0;
@@ -47,17 +77,24 @@ struct CalibrationViewRecord {
   Transform<Base, Flange> base_T_flange;
   std::vector<Eigen::Vector2d> detected_px;
   std::vector<Eigen::Vector2d> reprojected_px;  ///< same order; empty when not solved
-  double rms_px = 0;
-  bool held_out = false;
-  GrayPicture picture;  ///< whole frame of the camera; empty without one (e.g. --sensor fast)
+  double rms_px = 0;                            ///< of the above: no deviation of the arm is granted
+  std::optional<double> holdout_px;  ///< the same under a solve that left this view out; empty: not validated
+  bool used = true;                  ///< false: the solve left it out as wrong
+  GrayPicture picture;               ///< whole frame of the camera; empty without one (e.g. --sensor fast)
 };
 
-/// One look of sweep or exploration, in the order taken; counts are those of the mapped zone after it.
+/// One look of sweep or exploration, in the order taken; counts are voxels of the reach zone after it. When frames went
+/// into the map after the last look (on the way to the parking pose, or until a stop), the last of them is a row, too:
+/// phase "end". So the last row is the map as the job left it.
 struct MappingViewRecord {
-  std::string phase;  ///< "sweep" or "explore"
+  std::string phase;  ///< "sweep", "explore" or "end"
   double time_s = 0;
   JointVector joints_rad;
-  double gain_expected = 0;  ///< as scored when chosen; 0 for the first look
+  /// Unknown voxels that a look from here was thought to reach when it was chosen, other unknown ones seen through; 0
+  /// when it was not chosen for that (first look, look around after an interruption, end).
+  double gain_expected = 0;
+  /// By how much the unknown voxels became fewer since the row before (the first: since the map was empty), at the view
+  /// and on the way there.
   std::uint64_t gain_seen = 0;
   std::uint64_t unknown = 0, free = 0, occupied = 0;
 };
@@ -73,7 +110,8 @@ struct RemainingRecord {
 struct MappingRecord {
   double resolution_m = 0;
   std::vector<MappingViewRecord> views;
-  VoxelCounts voxels;
+  VoxelCounts voxels;       ///< of the reach zone at the end, as in the last of `views`
+  VoxelCounts grid_voxels;  ///< of the whole grid: what the map files hold
   std::vector<RemainingRecord> remaining;
   std::uint64_t frames_integrated = 0;
   std::uint64_t frames_dropped = 0;
@@ -86,7 +124,19 @@ struct StopRecord {
 
 struct SafetyRecord {
   std::optional<ClearanceTerms> clearance;  ///< empty when no calibration gave one
-  std::optional<double> min_clearance_m;  ///< smallest distance of the body to anything not free; empty without motion
+  /// Least distance of the moving arm's body (surface points 25 mm apart) to space that was not free at that moment:
+  /// voxels that were not known free (their nearest possible corner), where the zone counts its surface, keep-outs.
+  /// Before the calibration is accepted (body with the camera's envelope) and after (with the camera where it is);
+  /// empty without motion.
+  std::optional<double> min_clearance_calibrating_m;
+  std::optional<double> min_clearance_mapping_m;
+  /// The smaller of the two.
+  [[nodiscard]] std::optional<double> min_clearance_m() const {
+    if (!min_clearance_calibrating_m || !min_clearance_mapping_m) {
+      return min_clearance_calibrating_m ? min_clearance_calibrating_m : min_clearance_mapping_m;
+    }
+    return std::min(*min_clearance_calibrating_m, *min_clearance_mapping_m);
+  }
   std::vector<StopRecord> stops;
 };
 
@@ -95,6 +145,7 @@ struct PoolRecord {
   std::string name;
   std::uint64_t reserved_bytes = 0;
   std::uint64_t peak_bytes = 0;
+  bool declared = false;  ///< counted whole whatever is used of it; WallRecord has what was measured
 };
 
 struct MemoryRecord {
@@ -108,8 +159,14 @@ struct MemoryRecord {
 struct WallRecord {
   std::string started;  ///< UTC, ISO 8601
   double total_s = 0;
+  /// Time of the job in which the arm stood still and waited for a job's result. In virtual time jobs take their
+  /// declared durations, so the figure is declared, too; with --real-time it is what the computer took.
   double stall_s = 0;
+  bool real_time = false;
   std::uint64_t rss_bytes = 0;
+  std::uint64_t boot_heap_bytes = 0;      ///< what boot took from the heap and kept; measured by the allocator
+  std::uint64_t job_heap_peak_bytes = 0;  ///< the largest of all jobs; measured by the allocator
+  std::uint64_t library_bytes = 0;        ///< resident pages of files: program and shared libraries
   std::string folder;
   int workers = 0;
 };
@@ -164,7 +221,7 @@ struct RunRecord {
   std::vector<CalibrationViewRecord> calibration_views;
 
   std::optional<MappingRecord> mapping;
-  std::vector<RgbPicture> map_pictures;
+  std::vector<MapPicture> map_pictures;
   std::optional<SafetyRecord> safety;
   std::optional<MemoryRecord> memory;
   std::vector<FaultRecord> faults;

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+
 #include <algorithm>
 
 #include "app/report/html.hpp"
@@ -20,6 +21,25 @@ std::string clearance_table(const ClearanceTerms& c) {
   table.row({"required from the centre of every voxel that is not known free", millimetres(c.voxels_m)});
   table.row({"required from configured surfaces (safe zone, keep-out boxes)", millimetres(c.surface_m)});
   return table.html();
+}
+
+std::string distance_html(const SafetyRecord& s) {
+  if (!s.min_clearance_m()) return {};
+  HtmlTable table({"least distance of the moving body to space not free", "mm"}, 1);
+  if (s.min_clearance_calibrating_m) {
+    table.row({"calibrating: with the camera's envelope, to the surface of the safe zone and keep-out boxes",
+               millimetres(*s.min_clearance_calibrating_m)});
+  }
+  if (s.min_clearance_mapping_m) {
+    table.row({"mapping: with the camera, to the nearest corner of voxels not known free and to these surfaces",
+               millimetres(*s.min_clearance_mapping_m)});
+  }
+  return table.html() +
+         "<p class=\"hint\">Measured by the guardian at every report of the arm while it moved, on points 25 mm apart "
+         "all "
+         "over the body. The required distance is planned for; the stopping distance in it may be used up, and to "
+         "voxels "
+         "half a diagonal of it is already taken off here.</p>\n";
 }
 
 std::string stops_html(const std::vector<StopRecord>& stops) {
@@ -47,14 +67,7 @@ std::string safety_section(const RunRecord& record) {
   if (record.safety) {
     const SafetyRecord& s = *record.safety;
     if (s.clearance) body += clearance_table(*s.clearance);
-    if (s.min_clearance_m) {
-      body +=
-          paragraph(fmt::format("Least distance of the arm's body to anything not known free during the job: {} mm.",
-                                millimetres(*s.min_clearance_m)));
-      body +=
-          "<p class=\"hint\">Before the calibration the arm stays inside the safe zone, whose surface needs only the "
-          "smaller distance.</p>\n";
-    }
+    body += distance_html(s);
     body += stops_html(s.stops);
   } else {
     body += paragraph("The arm did not move in this run.");

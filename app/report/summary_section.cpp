@@ -30,19 +30,6 @@ Banner banner_of(const RunRecord& record) {
   return {"bad", "Ended by a fault"};
 }
 
-/// What a finished job has brought about, in one sentence.
-std::string done_text(const RunRecord& record) {
-  std::vector<std::string> parts;
-  if (record.hand_eye && !record.calibration_views.empty()) {
-    parts.push_back(fmt::format("The camera is calibrated from {} views of the board", record.hand_eye->views));
-  }
-  if (record.mapping) {
-    parts.push_back(
-        fmt::format("{} cell is mapped from {} views", parts.empty() ? "The" : "the", record.mapping->views.size()));
-  }
-  return parts.empty() ? std::string() : fmt::format("{}.", fmt::join(parts, ", "));
-}
-
 std::string tile(std::string_view value, std::string_view label) {
   return fmt::format("<div class=\"tile\"><b>{}</b><span>{}</span></div>\n", escape_html(value), escape_html(label));
 }
@@ -61,12 +48,11 @@ std::string tiles(const RunRecord& record) {
     const VoxelCounts& v = record.mapping->voxels;
     const double total = static_cast<double>(std::max<std::size_t>(1, v.unknown + v.free + v.occupied));
     html += tile(fmt::format("{:.1f} %", 100.0 * static_cast<double>(v.free + v.occupied) / total),
-                 "of the map's voxels are known");
+                 "of the space in reach is known");
     html += tile(fmt::format("{}", record.mapping->views.size()), "views for the map");
   }
-  if (record.safety && record.safety->min_clearance_m) {
-    html +=
-        tile(fmt::format("{:.0f} mm", *record.safety->min_clearance_m * 1e3), "least distance to anything not free");
+  if (record.safety && record.safety->min_clearance_m()) {
+    html += tile(fmt::format("{:.0f} mm", *record.safety->min_clearance_m() * 1e3), "least distance to space not free");
   }
   double end = 0;
   for (const PhaseRecord& phase : record.phases) end = std::max(end, phase.end_s);
@@ -78,11 +64,12 @@ std::string tiles(const RunRecord& record) {
 
 std::string summary_section(const RunRecord& record) {
   const Banner banner = banner_of(record);
-  std::string html = fmt::format("<div class=\"banner {}\"><h2>{}</h2>\n<p>{}</p>\n", banner.style, banner.title,
-                                 escape_html(record.reason));
-  if (record.outcome == Outcome::kDone) {
-    if (const std::string text = done_text(record); !text.empty()) html += paragraph(text);
+  std::string sentence = record.reason;
+  if (!sentence.empty() && sentence[0] >= 'a' && sentence[0] <= 'z') {
+    sentence[0] = static_cast<char>(sentence[0] - 'a' + 'A');
   }
+  std::string html =
+      fmt::format("<div class=\"banner {}\"><h2>{}</h2>\n<p>{}</p>\n", banner.style, banner.title, escape_html(sentence));
   if (record.hand_eye && record.hand_eye->verdict == Verdict::kRejected) {
     html += "<ul>\n";
     for (const std::string& reason : record.hand_eye->reasons) html += "<li>" + escape_html(reason) + "</li>\n";

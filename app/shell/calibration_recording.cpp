@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "app/report/png.hpp"
+#include "app/report/picture_bytes.hpp"
 #include "app/report/ros_files.hpp"
 #include "platform/linux/files.hpp"
 

@@ -1,13 +1,18 @@
 #include "app/shell/cart.hpp"
 
 #include <algorithm>
+<<<<<<< HEAD
 #include <filesystem>
+=======
+#include <cmath>
+>>>>>>> rep
 
 #include "algorithms/mapping/moveit_scene.hpp"
 #include "algorithms/mapping/octree_writer.hpp"
 #include "algorithms/mapping/ply_writer.hpp"
 #include "app/cli/small_commands.hpp"
 #include "app/config/load_config.hpp"
+#include "app/report/done_text.hpp"
 #include "app/shell/event_codec.hpp"
 #include "app/shell/job_settings.hpp"
 #include "platform/linux/files.hpp"
@@ -18,14 +23,18 @@
 namespace firstlook {
 namespace {
 
-/// Phases that result.json names: the outermost states and those directly within Running.
+/// Phases that result.json names: the outermost states, those within Running, and the parts of Calibrate and Conclude
+/// instead of these two. Explore stays whole: its parts last for seconds and come back for every view.
 bool is_phase(StateId state) {
+  const auto has_phases = [](StateId s) {
+    return s == StateId::kRunning || s == StateId::kCalibrate || s == StateId::kConclude;
+  };
   const StateId parent = state_row(state).parent;
-  return parent == StateId::kRunning || (parent == StateId::kNone && state != StateId::kRunning);
+  return !has_phases(state) && (parent == StateId::kNone || has_phases(parent));
 }
 
-std::string reason_text(const Ending& ending) {
-  if (!ending.has_fault) return "the job is done";
+std::string reason_text(const RunRecord& record, const Ending& ending) {
+  if (!ending.has_fault) return done_text(record);
   const FaultRow& row = fault_row(ending.fault);
   return fmt::format("E{} {}", static_cast<int>(ending.fault), row.text);
 }
@@ -61,6 +70,9 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   for (EventSource* source : sources) cart->loop_->add_source(*source);
   cart->loop_->set_watchdog(&cart->watchdog_);
   cart->machine_.emplace(machine_settings(cart->config_, options.scope), cart->decisions_);
+  auto share = memory::PoolShare::take(memory::Pool::kApplication, sizeof(Cart));
+  if (!share) return std::unexpected(share.error());
+  cart->share_ = std::move(*share);
   return cart;
 }
 
@@ -88,9 +100,13 @@ Status Cart::run() {
   memory::unseal();
   if (loop_allocations_ > 0) memory::print_first_loop_allocation(2);
   const Instant now = clock_->now();
+<<<<<<< HEAD
   if (!phases_.empty()) phases_.back().end = now;
   loop_.reset();
   runner_.reset();  // waits for a job that still works on what the record is made of
+=======
+  if (!phases_.empty() && !ended_) phases_.back().end = now;
+>>>>>>> rep
   if (const Status closed = journal_->close(now); !closed) return closed;
   return status;
 }
@@ -100,21 +116,26 @@ Status Cart::run() {
 void Cart::on_event(const Event& event) {
   const auto machine_event = decode_event(event.kind, event.bytes());
   if (!machine_event) return;  // the loop's own faults are in the journal
+  note_waiting(event.time);
   if (const auto* done = std::get_if<JobCompleted>(&*machine_event)) {
     bench_->published().take();
+<<<<<<< HEAD
     if (awaited_job_ != 0 && done->number == awaited_job_) {
       stall_s_ += (event.time - job_started_).seconds();
       awaited_job_ = 0;
     }
+=======
+    if (done->number == awaited_job_) awaited_job_ = 0;
+    if (done->number == awaited_look_) awaited_look_ = 0;
+>>>>>>> rep
   }
-  if (const auto* report = std::get_if<ArmReported>(&*machine_event)) watch_arm(*report);
+  if (const auto* report = std::get_if<ArmReported>(&*machine_event)) arm_moves_ = report->state.moving;
   machine_->on_event(event.time, *machine_event);
 }
 
-void Cart::watch_arm(const ArmReported& report) {
-  if (report.state.moving) {
-    min_clearance_m_ = std::min(min_clearance_m_, report.guardian_margin_m + bench_->published().required_m());
-  }
+void Cart::note_waiting(Instant now) {
+  if (!arm_moves_ && (awaited_job_ != 0 || awaited_look_ != 0)) stall_s_ += (now - waited_until_).seconds();
+  waited_until_ = now;
 }
 
 void Cart::end_of_turn(Instant now) {
@@ -136,8 +157,8 @@ void Cart::decision(DecisionKind kind, Instant now, std::span<const std::byte> b
 
 void Cart::state_entered(Instant now, StateId state) {
   if (!is_phase(state)) return;
-  if (!phases_.empty()) phases_.back().end = now;
-  if (!phases_.full()) phases_.push_back({state, now, now});
+  if (!phases_.empty() && !ended_) phases_.back().end = now;
+  if (!phases_.full() && !ended_) phases_.push_back({state, now, now});
   std::array<char, 96> line;
   const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s] {}", now.seconds(), state_row(state).name);
   narrator_.line({line.data(), std::min(end.size, line.size())});
@@ -164,8 +185,18 @@ void Cart::submit(JobKind kind, std::uint32_t number, std::span<const std::byte>
   request_.virtual_duration = virtual_duration(kind);
   request_.size = static_cast<std::uint32_t>(arguments.size());
   std::copy(arguments.begin(), arguments.end(), request_.arguments.begin());
+<<<<<<< HEAD
   // The machine waits for two jobs at most, but in real time those that a pause left behind may still run.
   if (!runner_->submit(request_, now)) host_.ask_shutdown(Fault::kQueueFull);
+=======
+  if (kind != JobKind::kIntegrate) {
+    awaited_job_ = number;
+  } else if (IntegrateArguments integrate; unpack(arguments, integrate) && integrate.at_view) {
+    awaited_look_ = number;
+  }
+  // The machine has one awaited job and one integration at a time: the queue of eight cannot be full.
+  ENSURE(7221, runner_->submit(request_, now).has_value());
+>>>>>>> rep
 }
 
 void Cart::set_timer(Instant, MachineTimer timer, Instant due) { timers_.set(static_cast<std::uint32_t>(timer), due); }
@@ -196,17 +227,75 @@ void Cart::stop_recorded(Instant now, Fault cause) {
   if (!stops_.full()) stops_.push_back({now, cause});
 }
 
-void Cart::finished(Instant, const Ending& ending) {
+void Cart::finished(Instant now, const Ending& ending) {
   ending_ = ending;
+  if (!phases_.empty()) phases_.back().end = now;
   ended_ = true;
 }
 
 // ---- the record
 
+MappingRecord Cart::mapping_record() const {
+  MappingRecord m;
+  m.resolution_m = config_.map.resolution_m;
+  m.views = bench_->mapping_views();
+  m.voxels = bench_->zone_counts();
+  m.grid_voxels = bench_->map().counts();
+  m.remaining = bench_->remaining();
+  m.frames_integrated = bench_->frames_integrated();
+  m.frames_dropped = bench_->frames_dropped();
+  return m;
+}
+
+SafetyRecord Cart::safety_record() const {
+  const auto if_finite = [](double value) { return std::isfinite(value) ? std::optional(value) : std::nullopt; };
+  SafetyRecord safety;
+  safety.clearance = bench_->clearance_terms();
+  safety.min_clearance_calibrating_m = if_finite(arm_source_->least_distance_calibrating_m());
+  safety.min_clearance_mapping_m = if_finite(arm_source_->least_distance_mapping_m());
+  for (const MotionStop& stop : stops_) {
+    const auto cause = fmt::format("E{} {}", static_cast<int>(stop.cause), fault_row(stop.cause).text);
+    safety.stops.push_back({stop.time.seconds(), cause});
+  }
+  return safety;
+}
+
+MemoryRecord Cart::memory_record() const {
+  MemoryRecord memory;
+  memory.budget_bytes = static_cast<std::uint64_t>(config_.memory.budget_mib) * memory::kMiB;
+  memory.peak_bytes = memory::peak_bytes();
+  memory.loop_allocations_after_seal = loop_allocations_;
+  for (const memory::BudgetRow& row : memory::kBudget) {
+    memory.pools.push_back(
+        {std::string(row.name), row.bytes(), memory::peak_bytes(row.pool), memory::is_standing(row.pool)});
+  }
+  return memory;
+}
+
+WallRecord Cart::wall_record() const {
+  WallRecord wall;
+  wall.started = started_;
+  wall.total_s = static_cast<double>(monotonic_ns()) * 1e-9 - wall_start_s_;
+  wall.stall_s = stall_s_;
+  wall.real_time = options_.real_time;
+  wall.rss_bytes = resident_bytes();
+  wall.job_heap_peak_bytes = runner_->counters().heap_peak_bytes;
+  wall.library_bytes = resident_file_bytes();
+  wall.workers = config_.workers;
+  return wall;
+}
+
+template <typename Draw>
+std::vector<MapPicture> Cart::with_map_pictures(Draw draw) const {
+  const VoxelMap swept = bench_->map_after_sweep();
+  const std::vector<CameraPlace> places = bench_->camera_places();
+  return draw(MapPictureInputs{bench_->map(), bench_->swept() ? &swept : nullptr, bench_->zone(), places,
+                               bench_->board_outline_m()});
+}
+
 RunRecord Cart::record() const {
   RunRecord r;
   r.outcome = ending_.outcome;
-  r.reason = reason_text(ending_);
   r.seed = config_.seed;
   r.cell = config_.cell;
   for (const PhasePassed& phase : phases_) {
@@ -218,42 +307,25 @@ RunRecord Cart::record() const {
   r.intrinsics = devices_.color.intrinsics();
   r.calibration_views = bench_->calibration_records();
   if (bench_->mapped()) {
-    MappingRecord m;
-    m.resolution_m = config_.map.resolution_m;
-    m.views = bench_->mapping_views();
-    m.voxels = bench_->map().counts();
-    m.remaining = bench_->remaining();
-    m.frames_integrated = bench_->frames_integrated();
-    m.frames_dropped = bench_->frames_dropped();
-    r.mapping = std::move(m);
-    r.map_pictures = bench_->map_pictures();
+    r.mapping = mapping_record();
+    r.map_pictures = with_map_pictures([](const MapPictureInputs& inputs) { return map_pictures(inputs); });
   }
-  SafetyRecord safety;
-  safety.clearance = bench_->clearance_terms();
-  if (min_clearance_m_ < 1e8) safety.min_clearance_m = min_clearance_m_;
-  for (const MotionStop& stop : stops_) {
-    const auto cause = fmt::format("E{} {}", static_cast<int>(stop.cause), fault_row(stop.cause).text);
-    safety.stops.push_back({stop.time.seconds(), cause});
-    r.faults.push_back({stop.time.seconds(), stop.cause, ""});
-  }
-  r.safety = std::move(safety);
-  MemoryRecord memory;
-  memory.budget_bytes = static_cast<std::uint64_t>(config_.memory.budget_mib) * memory::kMiB;
-  memory.peak_bytes = memory::peak_bytes();
-  memory.loop_allocations_after_seal = loop_allocations_;
-  for (const memory::BudgetRow& row : memory::kBudget) {
-    memory.pools.push_back({std::string(row.name), row.bytes(), memory::peak_bytes(row.pool)});
-  }
-  r.memory = std::move(memory);
+  r.safety = safety_record();
+  for (const MotionStop& stop : stops_) r.faults.push_back({stop.time.seconds(), stop.cause, ""});
+  r.memory = memory_record();
   r.provenance.version = version_text();
   r.provenance.arm_model = config_.arm.model;
   r.provenance.config_yaml = print_config(config_);
-  r.wall.started = started_;
-  r.wall.total_s = static_cast<double>(monotonic_ns()) * 1e-9 - wall_start_s_;
-  r.wall.stall_s = stall_s_;
-  r.wall.rss_bytes = resident_bytes();
-  r.wall.workers = config_.workers;
+  r.wall = wall_record();
+  r.reason = reason_text(r, ending_);
   return r;
+}
+
+std::vector<MapPicture> Cart::pictures_of_part(const NamedPart& part, const std::string& after_sweep,
+                                               const std::string& at_end) const {
+  if (!bench_->mapped()) return {};
+  return with_map_pictures(
+      [&](const MapPictureInputs& inputs) { return part_pictures(inputs, part, after_sweep, at_end); });
 }
 
 MapFiles Cart::map_files() const {

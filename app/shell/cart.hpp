@@ -62,6 +62,9 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   /// What was recorded; after run().
   [[nodiscard]] RunRecord record() const;
   [[nodiscard]] MapFiles map_files() const;
+  /// See part_pictures. Empty when nothing was mapped.
+  [[nodiscard]] std::vector<MapPicture> pictures_of_part(const NamedPart& part, const std::string& after_sweep,
+                                                         const std::string& at_end) const;
   [[nodiscard]] const Workbench& bench() const { return *bench_; }
   [[nodiscard]] PublishedSpace& published() { return bench_->published(); }
   [[nodiscard]] const Ending& ending() const { return ending_; }
@@ -87,8 +90,20 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   void on_event(const Event& event) override;
   void end_of_turn(Instant now) override;
 
+<<<<<<< HEAD
   void watch_arm(const ArmReported& report);
   void submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now);
+=======
+  /// Counts the time in which the arm stands and the machine waits for a job.
+  void note_waiting(Instant now);
+
+  [[nodiscard]] MappingRecord mapping_record() const;
+  [[nodiscard]] SafetyRecord safety_record() const;
+  [[nodiscard]] MemoryRecord memory_record() const;
+  [[nodiscard]] WallRecord wall_record() const;
+  template <typename Draw>
+  [[nodiscard]] std::vector<MapPicture> with_map_pictures(Draw draw) const;
+>>>>>>> rep
 
   Config config_;
   CartOptions options_;
@@ -112,16 +127,18 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   LoggedDecisions decisions_;
   std::optional<Machine> machine_;
   JobRequest request_;
+  memory::PoolShare share_;  ///< of the memory page, for the cart itself
 
   // What the report tells.
   FixedVector<PhasePassed, 128> phases_;
   FixedVector<MotionStop, 128> stops_;
   Ending ending_{Outcome::kFaulted, true, Fault::kInternal};
   bool ended_ = false;
-  double min_clearance_m_ = 1e9;
   double stall_s_ = 0;
-  Instant job_started_{};
+  Instant waited_until_{};
+  bool arm_moves_ = false;
   std::uint32_t awaited_job_ = 0;
+  std::uint32_t awaited_look_ = 0;  ///< integration of a look
   std::uint64_t loop_allocations_ = 0;
   std::string started_;
   double wall_start_s_ = 0;

@@ -1,6 +1,9 @@
 /// The devices as sources of events on the loop: what they report is stamped, packed and queued.
 #pragma once
 
+#include <algorithm>
+#include <limits>
+
 #include "app/jobs/published_space.hpp"
 #include "app/machine/events.hpp"
 #include "platform/journal/archive.hpp"
@@ -17,7 +20,8 @@ template <typename AppEvent>
   return queue.push(now, AppEvent::kKind, std::span<const std::byte>(bytes.data(), size));
 }
 
-/// The arm's reports, each with the guardian's finding.
+/// The arm's reports, each with the guardian's finding. Remembers how near the moving body came to what was not free,
+/// before there was a map and with it.
 class ArmSource final : public EventSource {
  public:
   ArmSource(hal::RobotArm& device, const ArmModel& model, const PublishedSpace& space)
@@ -28,13 +32,23 @@ class ArmSource final : public EventSource {
       const auto state = device_.poll(now);
       if (!state) break;
       const GuardianVerdict verdict = space_.judge(model_, state->position_rad);
+      if (state->moving) {
+        double& least_m = space_.mapped() ? least_mapping_m_ : least_calibrating_m_;
+        least_m = std::min(least_m, verdict.distance_m);
+      }
       if (const Status s = push_event(queue, now, ArmReported{*state, verdict.margin_m}); !s) return s;
     }
     return {};
   }
 
+  /// Infinite when the arm did not move.
+  [[nodiscard]] double least_distance_calibrating_m() const { return least_calibrating_m_; }
+  [[nodiscard]] double least_distance_mapping_m() const { return least_mapping_m_; }
+
  private:
   static constexpr std::size_t kReserved = 16;  // slots for the other sources of a turn
+  double least_calibrating_m_ = std::numeric_limits<double>::infinity();
+  double least_mapping_m_ = std::numeric_limits<double>::infinity();
   hal::RobotArm& device_;
   const ArmModel& model_;
   const PublishedSpace& space_;

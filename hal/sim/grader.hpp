@@ -43,6 +43,8 @@ struct FinalClaims {
 /// Known share of the observable voxels inside a region that the cell names (behind the screens, inside the box).
 struct RegionFigure {
   std::string name;
+  Eigen::Vector3d low_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d high_m = Eigen::Vector3d::Zero();
   std::size_t observable = 0;
   std::size_t known = 0;
   double known_fraction = 0;  ///< of the observable voxels; 0 without any

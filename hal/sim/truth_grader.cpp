@@ -62,7 +62,7 @@ std::vector<RegionFigure> TruthGrader::regions(const FinalClaims& claims) {
   const GridGeometry& geometry = claims.map->geometry();
   const ObservableSet& set = observable(geometry, claims.observable);
   for (const NamedRegion& region : truth_.regions) {
-    RegionFigure figure{region.name};
+    RegionFigure figure{region.name, region.low_m, region.high_m};
     for (std::size_t i = 0; i < set.seen.size(); ++i) {
       if (set.seen[i] == 0 || !in_region(region, geometry.center_m(geometry.voxel_at(i)))) continue;
       ++figure.observable;

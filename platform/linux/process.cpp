@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -29,23 +30,30 @@ std::string utc_date(const char* format) {
   return {text.data(), std::strftime(text.data(), text.size(), format, &parts)};
 }
 
-}  // namespace
-
-std::size_t resident_bytes() {
+/// proc(5): statm has numbers of pages, separated by blanks; 1 is the resident set, 2 its part that files back.
+std::size_t statm_bytes(int column) {
   const int descriptor = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return 0;
   std::array<char, 128> buffer{};
   const ssize_t got = ::read(descriptor, buffer.data(), buffer.size());
   ::close(descriptor);
   if (got <= 0) return 0;
-  // proc(5): size and resident set, in pages, separated by a blank.
-  const std::string_view text(buffer.data(), static_cast<std::size_t>(got));
-  const std::size_t blank = text.find(' ');
-  if (blank == std::string_view::npos) return 0;
+  const char* at = buffer.data();
+  const char* const end = at + got;
+  for (; column > 0; --column) {
+    at = std::find(at, end, ' ');
+    if (at != end) ++at;
+  }
   std::size_t pages = 0;
-  std::from_chars(text.data() + blank + 1, text.data() + text.size(), pages);
+  std::from_chars(at, end, pages);
   return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
+
+}  // namespace
+
+std::size_t resident_bytes() { return statm_bytes(1); }
+
+std::size_t resident_file_bytes() { return statm_bytes(2); }
 
 Status lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};

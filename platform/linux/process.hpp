@@ -10,6 +10,8 @@ namespace firstlook {
 
 /// Resident set size from /proc/self/statm; 0 when it cannot be read. Does not allocate.
 [[nodiscard]] std::size_t resident_bytes();
+/// The part of it that is pages of files: the program and its shared libraries; 0 when it cannot be read.
+[[nodiscard]] std::size_t resident_file_bytes();
 /// Locks all pages in memory, present and future. Error: kOutOfMemory when the system does not allow it: go on without.
 [[nodiscard]] Status lock_memory();
 

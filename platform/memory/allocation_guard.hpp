@@ -56,6 +56,8 @@ class ContextScope {
   AllocationContext outer_;
 };
 
+inline constexpr std::size_t kHeapUncapped = SIZE_MAX / 4;  ///< to measure, not to limit
+
 /// The calling thread runs a job: at most `cap_bytes` may be allocated and not yet freed; beyond that malloc returns
 /// null, so that C++ throws std::bad_alloc. What a nested scope takes is not counted in the outer one.
 class JobHeapScope {

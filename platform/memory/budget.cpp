@@ -43,8 +43,9 @@ void release(Pool pool, std::size_t bytes) {
 }
 
 Status account_standing_rows() {
-  for (const Pool pool : {Pool::kThreadStacks, Pool::kJobHeap, Pool::kLibraryPages}) {
-    if (Status status = account(pool, budget_row(pool).bytes()); !status) return status;
+  for (const BudgetRow& row : kBudget) {
+    if (!is_standing(row.pool)) continue;
+    if (Status status = account(row.pool, row.bytes()); !status) return status;
   }
   return {};
 }

@@ -91,8 +91,12 @@ static_assert(budget_rows_in_order());
 [[nodiscard]] Status account(Pool pool, std::size_t bytes);
 /// Gives back what account() took.
 void release(Pool pool, std::size_t bytes);
-/// Takes the rows that stand whole from boot whatever is used of them: thread stacks, job heap, library pages. So the
-/// peak does not depend on the number of workers. Error: kOutOfMemory when part of one is taken already.
+/// Rows that are declared, not counted: they stand whole from boot whatever is used of them.
+[[nodiscard]] constexpr bool is_standing(Pool pool) {
+  return pool == Pool::kThreadStacks || pool == Pool::kJobHeap || pool == Pool::kLibraryPages;
+}
+/// Takes the standing rows: thread stacks, job heap, library pages. So the peak does not depend on the number of
+/// workers. Error: kOutOfMemory when part of one is taken already.
 [[nodiscard]] Status account_standing_rows();
 [[nodiscard]] std::size_t accounted_bytes(Pool pool);
 /// High-water mark of one pool.

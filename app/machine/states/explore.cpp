@@ -4,7 +4,10 @@
 namespace firstlook::states {
 namespace {
 constexpr std::uint32_t kReplansMax = 8;  // in a row, without a view between
-}
+
+/// As in views.csv, where the sweep's come first.
+std::uint32_t next_number(const Progress& p) { return p.sweep_views + p.explore_views + 1; }
+}  // namespace
 
 void enter_choose(Machine& m) {
   Progress& p = m.progress();
@@ -23,6 +26,7 @@ Handled on_choose(Machine& m, const MachineEvent& event) {
       m.transition(StateId::kPlan);
     } else if (choice->blocked) {
       ++p.replans;
+      m.show("view {}: looking around", next_number(p));
       m.transition(StateId::kLook);
     } else {
       m.transition(StateId::kVerifyBoard);
@@ -55,7 +59,7 @@ Handled on_plan(Machine& m, const MachineEvent& event) {
 
 void enter_move(Machine& m) {
   Progress& p = m.progress();
-  m.show("view {}: expecting {:.0f} new voxels", p.explore_views + 1, p.chosen.gain_expected);
+  m.show("view {}: expecting {:.0f} new voxels", next_number(p), p.chosen.gain_expected);
   m.start_trip(p.chosen.path, true);
 }
 

@@ -5,6 +5,12 @@ namespace firstlook::states {
 namespace {
 constexpr std::uint32_t kReplansMax = 5;  // in a row: looks in between may free the arm's surroundings
 
+/// Views have the numbers of views.csv. One without a way there is a look around from where the arm stands.
+void look_around(Machine& m) {
+  m.show("sweep view {}: looking around", m.progress().sweep_views + 1);
+  m.start_look(true, 1);
+}
+
 void next_view(Machine& m) {
   m.start_job(JobKind::kNextSweepView, FromHere{m.arm().position_rad, m.progress().steps++, m.now().seconds()});
 }
@@ -15,7 +21,7 @@ void take(Machine& m, const NextViewResult& choice) {
     m.show("sweep view {}", p.sweep_views + 1);
     m.start_trip(choice.path, true);
   } else if (choice.blocked && ++p.replans <= kReplansMax) {
-    m.start_look(true, 1);
+    look_around(m);
   } else if (choice.blocked) {
     m.conclude(Outcome::kSafelyStopped, Fault::kStartBlocked);
   } else {
@@ -29,9 +35,10 @@ void take(Machine& m, const NextViewResult& choice) {
 /// view of the board left it, the camera that is now known may be too near to the arm itself.
 void enter_sweep(Machine& m) {
   if (m.progress().sweep_views == 0) {
+    m.show("sweep view 1: from where the job began");
     plan_to(m, m.settings().parking_rad, MotionPhase::kBeforeCalibration);
   } else {
-    m.start_look(true, 1);
+    look_around(m);
   }
 }
 

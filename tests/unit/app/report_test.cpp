@@ -5,9 +5,13 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include <yaml-cpp/yaml.h>
+
+#include "app/report/done_text.hpp"
 #include "app/report/html.hpp"
-#include "app/report/png.hpp"
+#include "app/report/picture_bytes.hpp"
 #include "app/report/report_html.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/ros_files.hpp"
@@ -73,14 +77,18 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(hand_eye["covariance"].size() == 36);
   CHECK(hand_eye["reasons"].is_array());
 
-  CHECK(keys_of(json["mapping"]) == Keys{"views", "resolution_m", "voxels", "remaining"});
+  CHECK(keys_of(json["mapping"]) == Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "remaining"});
   CHECK(json["mapping"]["views"] == 24);
   CHECK(keys_of(json["mapping"]["voxels"]) == Keys{"unknown", "free", "occupied"});
-  CHECK(keys_of(json["mapping"]["remaining"][0]) == Keys{"voxels", "reason"});
-  CHECK(keys_of(json["safety"]) == Keys{"clearance_m", "min_clearance_m", "stops"});
+  CHECK(keys_of(json["mapping"]["grid_voxels"]) == Keys{"unknown", "free", "occupied"});
+  CHECK(keys_of(json["mapping"]["remaining"][0]) == Keys{"voxels", "reason", "center_m"});
+  CHECK(keys_of(json["safety"]) ==
+        Keys{"clearance_m", "min_clearance_m", "min_clearance_calibrating_m", "min_clearance_mapping_m", "stops"});
+  CHECK(json["safety"]["min_clearance_m"] == json["safety"]["min_clearance_calibrating_m"]);  // the smaller one
   CHECK(keys_of(json["safety"]["stops"][0]) == Keys{"time_s", "cause"});
   CHECK(keys_of(json["memory"]) == Keys{"budget_bytes", "peak_bytes", "loop_allocations_after_seal"});
-  for (const char* key : {"started", "total_s", "stall_s", "rss_bytes"}) CHECK(json["wall"].contains(key));
+  for (const char* key : {"started", "total_s", "stall_s", "real_time", "rss_bytes", "job_heap_peak_bytes"})
+    CHECK(json["wall"].contains(key));
   CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2", "contacts",
                                        "unknown_entries", "coverage_of_observable", "false_free_voxels", "regions"});
 }
@@ -103,7 +111,7 @@ TEST_CASE("sections that did not run are null, and numbers that are not finite, 
 
 TEST_CASE("only wall differs between two runs of one record", "[report]") {
   RunRecord first = sample_record(), second = sample_record();
-  second.wall = {"2027-02-02T02:02:02Z", 1, 2, 3, "/elsewhere", 1};
+  second.wall = {"2027-02-02T02:02:02Z", 1, 2, true, 3, 4, 5, 6, "/elsewhere", 1};
   ordered_json a = ordered_json::parse(result_json(first)), b = ordered_json::parse(result_json(second));
   CHECK(a["wall"] != b["wall"]);
   a.erase("wall");
@@ -188,7 +196,8 @@ TEST_CASE("hostile text stays text", "[report]") {
   record.phases[0].name = evil;
   record.mapping->views[0].phase = evil;
   record.mapping->remaining[0].reason = evil;
-  record.map_pictures[0].caption = evil;
+  record.map_pictures[0].picture.caption = record.map_pictures[0].group = evil;
+  record.map_pictures[0].labels[0].text = evil;
   record.safety->stops[0].cause = evil;
   record.memory->pools[0].name = evil;
   record.faults[0].detail = evil;
@@ -216,8 +225,8 @@ TEST_CASE("the page fetches nothing and tells the essentials", "[report]") {
   CHECK_THAT(page, Contains("occluded: something stands between") && Contains("out of range: nearer") &&
                        Contains("E5005") && Contains("observed behind box, after the sweep"));
   std::size_t pictures = 0;
-  for (std::size_t at = 0; (at = page.find("data:image/png;base64,", at)) != std::string::npos; ++at) ++pictures;
-  CHECK(pictures == 18);
+  for (std::size_t at = 0; (at = page.find("data:image/", at)) != std::string::npos; ++at) ++pictures;
+  CHECK(pictures == 19);
 }
 
 TEST_CASE("a page can be made of any record", "[report]") {
@@ -228,7 +237,9 @@ TEST_CASE("a page can be made of any record", "[report]") {
   odd.calibration_views[1].picture = {};              // --sensor fast
   odd.calibration_views[2].reprojected_px.clear();    // not solved
   odd.calibration_views[3].detected_px[0].x() = std::numeric_limits<double>::quiet_NaN();
-  odd.map_pictures[0].pixels.clear();
+  odd.map_pictures[0].picture.pixels.clear();
+  odd.map_pictures[1].lines[0].points_px[1].x() = odd.map_pictures[1].views[0].at_px.y() =
+      odd.map_pictures[1].labels[0].at_px.x() = std::numeric_limits<double>::quiet_NaN();
   odd.mapping->views.resize(1);
   odd.mapping->views[0].unknown = odd.mapping->views[0].free = odd.mapping->views[0].occupied = 0;
   odd.phases = {{"boot", 0, 0}};
@@ -271,6 +282,10 @@ TEST_CASE("pictures are shrunk by whole blocks and encoded the same each time", 
   CHECK(encode_png(picture)[1] == std::byte{'P'});
   CHECK(encode_png(GrayPicture{3, 3, {1, 2}}).empty());
   CHECK(encode_png(RgbPicture{"", -1, 5, {}}).empty());
+  CHECK(encode_jpeg(picture) == encode_jpeg(picture));
+  CHECK(encode_jpeg(picture)[1] == std::byte{0xD8});  // start of image
+  CHECK(encode_jpeg(GrayPicture{3, 3, {1, 2}}).empty());
+  CHECK(encode_jpeg(GrayPicture{0, 3, {}}).empty());
 }
 
 TEST_CASE("all files of the calibration carry the same transform", "[report]") {
@@ -307,6 +322,45 @@ TEST_CASE("all files of the calibration carry the same transform", "[report]") {
     const Eigen::AngleAxisd ur(turn.norm(), turn.normalized());
     CHECK(ur.toRotationMatrix().isApprox(truth.rotation(), 1e-5));
   }
+}
+
+TEST_CASE("easy_handeye gets only keys that it knows, and finds the file by its name", "[report]") {
+  const std::vector<NamedFile> files = ros_calibration_files({});
+  // The keywords of easy_handeye's HandeyeCalibrationParameters, which refuses others.
+  const std::set<std::string> known = {"eye_on_hand",          "namespace",           "robot_base_frame",
+                                       "robot_effector_frame", "tracking_base_frame", "tracking_marker_frame",
+                                       "move_group_namespace", "move_group"};
+  const YAML::Node first = YAML::Load(files[0].text);
+  for (const auto& item : first["parameters"]) CHECK(known.contains(item.first.as<std::string>()));
+  CHECK(first["parameters"].size() == known.size());
+  CHECK(first["parameters"]["namespace"].as<std::string>() == "/firstlook_eye_on_hand/");
+  CHECK(first["transformation"].size() == 7);
+  const YAML::Node second = YAML::Load(files[1].text);
+  CHECK(second["parameters"]["calibration_type"].as<std::string>() == "eye_in_hand");
+  CHECK(second["transform"]["rotation"]["w"].as<double>() == 1);
+  for (const YAML::Node& file : {first, second}) {
+    CHECK(file["parameters"]["robot_effector_frame"].as<std::string>() == "tool0");
+    CHECK(file["parameters"]["tracking_base_frame"].as<std::string>() == "camera_color_optical_frame");
+  }
+}
+
+TEST_CASE("figures of a validation that did not take place are absent", "[report]") {
+  RunRecord record = sample_record();
+  HandEyeResult& h = *record.hand_eye;
+  h.holdout_rms_px = h.holdout_rms_m = h.usable_distance_m = 0;
+  const ordered_json json = ordered_json::parse(result_json(record))["hand_eye"];
+  CHECK(json["holdout_rms_px"].is_null());
+  CHECK(json["holdout_rms_mm"].is_null());
+  CHECK(json["usable_distance_m"].is_null());
+  CHECK_THAT(report_html(record), Contains("not determined"));
+}
+
+TEST_CASE("the sentence of a finished job", "[report]") {
+  RunRecord record = sample_record();
+  CHECK(done_text(record).starts_with("camera known to 0.19 mm and 0.31 mrad (1 sigma, worst axis) from 16 views"));
+  CHECK_THAT(done_text(record), Contains("; ") && Contains(" % of the space in reach known after 24 views"));
+  record.hand_eye.reset();
+  CHECK_THAT(done_text(record), Catch::Matchers::Matches("^[0-9.]+ % of the space.*"));
 }
 
 TEST_CASE("roll, pitch and yaw where they are not unique", "[report]") {

@@ -43,7 +43,7 @@ CalibrationViewRecord calibration_view(int number, Random& random) {
   view.time_s = 20 + 4.7 * number;
   view.joints_rad = JointVector{0.1 * number, -1.2, 1.4, -1.8, -1.57, 0.2 * number};
   view.base_T_flange = Transform<Base, Flange>(Eigen::Quaterniond::Identity(), {0.2, 0.02 * number, 0.6});
-  view.held_out = number % 4 == 3;
+  view.used = number != 11;
   Pose camera_T_board = Pose::Identity();
   camera_T_board.linear() = (Eigen::AngleAxisd(0.5 * std::sin(1.1 * number), Eigen::Vector3d::UnitX()) *
                              Eigen::AngleAxisd(0.5 * std::cos(1.7 * number), Eigen::Vector3d::UnitY()) *
@@ -59,6 +59,7 @@ CalibrationViewRecord calibration_view(int number, Random& random) {
     sum += error.squaredNorm() / 2;
   }
   view.rms_px = std::sqrt(sum / kBoard.corners());
+  if (view.used) view.holdout_px = 1.3 * view.rms_px;
   view.picture = picture_of(camera_T_board, random);
   return view;
 }
@@ -104,6 +105,7 @@ MappingRecord mapping() {
                        static_cast<std::uint64_t>(total) - free - occupied, free, occupied});
   }
   m.voxels = {m.views.back().unknown, m.views.back().free, m.views.back().occupied};
+  m.grid_voxels = {m.voxels.unknown + 20000, m.voxels.free + 50000, m.voxels.occupied + 1000};
   m.remaining = {{1850, "occluded", {0.9, 0.3, 0.2}},
                  {640, "out_of_range", {-0.2, 0.1, -0.1}},
                  {210, "occluded", {0.7, -0.6, 0.5}}};
@@ -112,8 +114,15 @@ MappingRecord mapping() {
   return m;
 }
 
-RgbPicture map_picture(std::string caption) {
-  RgbPicture picture{std::move(caption), 480, 360, {}};
+MapPicture map_picture(std::string caption, std::string group) {
+  MapPicture p;
+  RgbPicture& picture = p.picture;
+  picture = {std::move(caption), 480, 360, {}};
+  p.group = std::move(group);
+  p.lines = {{"path", {{100, 100}, {200, 150}, {220, 250}}}};
+  p.labels = {{"tick", "0.5", {50, 340}}};
+  p.views = {{"sweep", {100, 100}, std::nullopt, 1}, {"explore", {200, 150}, Eigen::Vector2d(210, 150), 2}};
+  p.heights_m = {-0.3, 1.5};
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {
       const bool wall = (x / 40 + y / 40) % 5 == 0;
@@ -121,7 +130,7 @@ RgbPicture map_picture(std::string caption) {
         picture.pixels.push_back(static_cast<std::uint8_t>(wall ? 60 + 40 * channel : 235));
     }
   }
-  return picture;
+  return p;
 }
 
 SafetyRecord safety() {
@@ -135,7 +144,7 @@ SafetyRecord safety() {
   c.stopping_m = 0.0165;
   c.voxels_m = 0.0713;
   c.surface_m = 0.019;
-  return {c, 0.0741, {{151.2, "paused by the operator"}}};
+  return {c, 0.0214, 0.0312, {{151.2, "paused by the operator"}}};
 }
 
 RunRecord make_record() {
@@ -153,16 +162,19 @@ RunRecord make_record() {
   r.intrinsics = kCamera;
   for (int i = 0; i < 16; ++i) r.calibration_views.push_back(calibration_view(i, random));
   r.mapping = mapping();
-  r.map_pictures = {map_picture("from above, at 0.40 m"), map_picture("occupied space and the camera's path")};
+  r.map_pictures = {map_picture("after the sweep", "Layer at 0.40 m"), map_picture("at the end", "Layer at 0.40 m"),
+                    map_picture("seen from behind", "The map")};
   r.safety = safety();
-  r.memory = MemoryRecord{
-      256u << 20,
-      96u << 20,
-      0,
-      {{"map", 8u << 20, 7u << 20}, {"depth frames", 4u << 20, 4u << 20}, {"heap of jobs", 128u << 20, 70u << 20}}};
+  r.memory = MemoryRecord{256u << 20,
+                          96u << 20,
+                          0,
+                          {{"map", 8u << 20, 7u << 20},
+                           {"depth frames", 4u << 20, 4u << 20},
+                           {"heap of jobs", 128u << 20, 128u << 20, true}}};
   r.faults = {{151.2, Fault::kProgramStopped, "program stopped on the pendant"}};
   r.provenance = {"0.1.0", "ur5", "full", "cell: workshop\n", "77aa01"};
-  r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, 180u << 20, "runs/20260131-7", 2};
+  r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
+            "runs/20260131-7",      2};
   r.truth = TruthRecord{0.21, 0.34, 4.7, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }

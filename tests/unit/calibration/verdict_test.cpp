@@ -47,6 +47,15 @@ TEST_CASE("a good set is accepted, with figures that belong together", "[calibra
   CHECK(result->usable_distance_m > 1);
   CHECK(result->fits.size() == 25);
 
+  // The figure of the whole is that of the views, each held out once.
+  REQUIRE(result->holdout_px.size() == 25);
+  double squared_px = 0;
+  for (const std::optional<double>& view_px : result->holdout_px) {
+    REQUIRE(view_px);
+    squared_px += *view_px * *view_px;
+  }
+  CHECK(result->holdout_rms_px == Approx(std::sqrt(squared_px / 25)));
+
   const auto again = calibrate_hand_eye(setup.camera, setup.board, views);
   CHECK(again->flange_T_camera.pose().matrix() == result->flange_T_camera.pose().matrix());
   CHECK(again->covariance == result->covariance);
@@ -72,6 +81,38 @@ TEST_CASE("poor sets are rejected with reasons", "[calibration]") {
   const auto rough = calibrate_hand_eye(good.camera, good.board, few);
   REQUIRE(rough);
   CHECK(rough->verdict == Verdict::kRejected);
+}
+
+TEST_CASE("a view that the solve left out is not held out, either, and the others keep their places", "[calibration]") {
+  const Setup setup;
+  Random random(29);
+  auto views = test::observe_views(setup, 20, random);
+  views[6].base_T_flange = views[11].base_T_flange;  // a pose of another view
+  const auto result = calibrate_hand_eye(setup.camera, setup.board, views);
+  REQUIRE(result);
+  REQUIRE(result->holdout_px.size() == 20);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    CHECK(result->fits[i].used == (i != 6));
+    CHECK(result->holdout_px[i].has_value() == (i != 6));
+  }
+  HandEyeOptions options;
+  auto solved = solve_hand_eye(setup.camera, setup.board, views, options);
+  REQUIRE(solved);
+  CHECK(solved->holdout_px.empty());
+  CHECK(solved->verdict == Verdict::kRejected);
+  CHECK(solved->reasons == std::vector<std::string>{"not validated"});
+  // Held out by hand: the group that view 11 is in (the tenth of those used) against the others.
+  std::vector<CalibrationView> others;
+  std::size_t place = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (i == 6) continue;
+    if (place++ % 5 != 10 % 5) others.push_back(views[i]);
+  }
+  const auto without = solve_hand_eye(setup.camera, setup.board, others, options);
+  REQUIRE(without);
+  const double by_hand_px = reprojection_rms(setup.camera, setup.board, std::span(&views[11], 1),
+                                             without->flange_T_camera, without->base_T_board);
+  CHECK(*result->holdout_px[11] == Approx(by_hand_px).epsilon(0.3));
 }
 
 TEST_CASE("pose pairs: no pixels, the same verdicts", "[calibration]") {

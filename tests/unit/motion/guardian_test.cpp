@@ -72,6 +72,30 @@ TEST_CASE("a small thing deep inside a large capsule is seen") {
   CHECK(verdict.capsule >= 0);
 }
 
+TEST_CASE("the distance to what is not free does not depend on what is required, and half a voxel is taken off") {
+  const Body body = bare_body(kArm);
+  const Clearance strict{.voxels_m = 0.09, .surface_m = 0.02}, none;
+  Random random(3);
+  const RandomCell cell(4, 8);
+  FreeSpace mapped;
+  mapped.field = &cell.field;
+  mapped.zone_intact = false;
+  const double half_diagonal_m = cell.field.geometry().resolution_m * std::sqrt(3.0) / 2;
+  FreeSpace zone_only;
+  zone_only.zone = {0.5, 1.15, 0.0};
+  for (int i = 0; i < 100; ++i) {
+    const JointVector q = random_joints(random, 3.1);
+    const GuardianVerdict asked = check(kArm, body, mapped, strict, q, std::nullopt);
+    const GuardianVerdict unasked = check(kArm, body, mapped, none, q, std::nullopt);
+    CHECK(asked.distance_m == Approx(unasked.distance_m));
+    CHECK(asked.distance_m == Approx(unasked.margin_m - half_diagonal_m));
+    CHECK(asked.margin_m == Approx(unasked.margin_m - strict.voxels_m));
+  }
+  const GuardianVerdict in_zone = check(kArm, body, zone_only, strict, default_start(kArm), std::nullopt);
+  REQUIRE(in_zone.distance_m > 0);
+  CHECK(in_zone.margin_m == Approx(in_zone.distance_m - strict.surface_m));  // a surface is where it is
+}
+
 TEST_CASE("the guardian agrees with certified paths and sees bodies that leave free space") {
   const Body body = bare_body(kArm);
   const ClearanceTerms terms = required_clearance({});

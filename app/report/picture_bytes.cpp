@@ -1,8 +1,14 @@
-#include "app/report/png.hpp"
+#include "app/report/picture_bytes.hpp"
 
 #include <png.h>
 
 #include <algorithm>
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+
+// jpeglib.h needs <cstdio> before it.
+#include <jpeglib.h>
 
 namespace firstlook {
 namespace {
@@ -31,6 +37,41 @@ bool write_png(png_structp png, png_infop info, const std::uint8_t* pixels, int 
   return true;
 }
 
+/// libjpeg's error handling: it must not return from error_exit, and the default one ends the process.
+struct JpegErrors {
+  jpeg_error_mgr manager;
+  std::jmp_buf jump;
+};
+
+void leave_jpeg(j_common_ptr info) { std::longjmp(reinterpret_cast<JpegErrors*>(info->err)->jump, 1); }
+
+/// As above, nothing with a destructor. `bytes` belong to malloc.
+bool write_jpeg(jpeg_compress_struct* info, JpegErrors* errors, const GrayPicture* picture, unsigned char** bytes,
+                unsigned long* size) {
+  constexpr int kQuality = 75;
+  info->err = jpeg_std_error(&errors->manager);
+  errors->manager.error_exit = leave_jpeg;
+  if (setjmp(errors->jump) != 0) return false;
+  jpeg_create_compress(info);
+  jpeg_mem_dest(info, bytes, size);
+  info->image_width = static_cast<JDIMENSION>(picture->width);
+  info->image_height = static_cast<JDIMENSION>(picture->height);
+  info->input_components = 1;
+  info->in_color_space = JCS_GRAYSCALE;
+  jpeg_set_defaults(info);
+  info->dct_method = JDCT_ISLOW;  // integers: the same bytes everywhere
+  jpeg_set_quality(info, kQuality, TRUE);
+  jpeg_start_compress(info, TRUE);
+  while (info->next_scanline < info->image_height) {
+    // libjpeg only reads the row, but does not say so.
+    auto* row = const_cast<JSAMPROW>(picture->pixels.data()) +
+                static_cast<std::size_t>(info->next_scanline) * static_cast<std::size_t>(picture->width);
+    jpeg_write_scanlines(info, &row, 1);
+  }
+  jpeg_finish_compress(info);
+  return true;
+}
+
 std::vector<std::byte> encode(std::span<const std::uint8_t> pixels, int width, int height, int channels) {
   constexpr int kSideMax = 16384;
   std::vector<std::byte> out;
@@ -55,6 +96,26 @@ std::vector<std::byte> encode_png(const GrayPicture& picture) {
 
 std::vector<std::byte> encode_png(const RgbPicture& picture) {
   return encode(picture.pixels, picture.width, picture.height, 3);
+}
+
+std::vector<std::byte> encode_jpeg(const GrayPicture& picture) {
+  std::vector<std::byte> out;
+  const bool whole =
+      picture.width > 0 && picture.height > 0 && picture.width <= JPEG_MAX_DIMENSION &&
+      picture.height <= JPEG_MAX_DIMENSION &&
+      picture.pixels.size() == static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
+  if (!whole) return out;
+  jpeg_compress_struct info{};
+  JpegErrors errors{};
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  if (write_jpeg(&info, &errors, &picture, &bytes, &size)) {
+    const auto* first = reinterpret_cast<const std::byte*>(bytes);
+    out.assign(first, first + size);
+  }
+  jpeg_destroy_compress(&info);
+  std::free(bytes);
+  return out;
 }
 
 std::string base64(std::span<const std::byte> bytes) {
