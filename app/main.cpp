@@ -1,10 +1,7 @@
 /// firstlook: the only file that names concrete devices.
-<<<<<<< HEAD
-#include <cerrno>
-=======
 #include <algorithm>
 #include <cctype>
->>>>>>> rep
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <exception>

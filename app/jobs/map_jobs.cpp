@@ -46,7 +46,6 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   return result;
 }
 
-<<<<<<< HEAD
 /// A camera that hangs may go on sending the last picture with new stamps. A picture without any return proves nothing.
 bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
   const std::span<const std::uint16_t> pixels = depth_pixels_.items();
@@ -61,14 +60,9 @@ bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
   return result.frozen;
 }
 
-void Workbench::note_view(const IntegrateArguments& arguments, std::uint64_t gained) {
-  if (mapping_views_.size() == mapping_views_.capacity()) return;
-  const VoxelCounts counts = zone_counts();
-=======
 /// A look becomes a row of the record; of frames on the way the last one waits to become the row "end".
 void Workbench::note_frame(const IntegrateArguments& arguments, const VoxelCounts& counts) {
   if (arguments.at_view && mapping_views_.size() == mapping_views_.capacity()) return;
->>>>>>> rep
   MappingViewRecord r;
   r.phase = !arguments.at_view ? "end" : sweeping_ ? "sweep" : "explore";
   r.time_s = arguments.frame.frame.stamp.seconds();

@@ -1,11 +1,8 @@
 #include "app/shell/cart.hpp"
 
 #include <algorithm>
-<<<<<<< HEAD
-#include <filesystem>
-=======
 #include <cmath>
->>>>>>> rep
+#include <filesystem>
 
 #include "algorithms/mapping/moveit_scene.hpp"
 #include "algorithms/mapping/octree_writer.hpp"
@@ -100,13 +97,9 @@ Status Cart::run() {
   memory::unseal();
   if (loop_allocations_ > 0) memory::print_first_loop_allocation(2);
   const Instant now = clock_->now();
-<<<<<<< HEAD
-  if (!phases_.empty()) phases_.back().end = now;
+  if (!phases_.empty() && !ended_) phases_.back().end = now;
   loop_.reset();
   runner_.reset();  // waits for a job that still works on what the record is made of
-=======
-  if (!phases_.empty() && !ended_) phases_.back().end = now;
->>>>>>> rep
   if (const Status closed = journal_->close(now); !closed) return closed;
   return status;
 }
@@ -119,15 +112,8 @@ void Cart::on_event(const Event& event) {
   note_waiting(event.time);
   if (const auto* done = std::get_if<JobCompleted>(&*machine_event)) {
     bench_->published().take();
-<<<<<<< HEAD
-    if (awaited_job_ != 0 && done->number == awaited_job_) {
-      stall_s_ += (event.time - job_started_).seconds();
-      awaited_job_ = 0;
-    }
-=======
     if (done->number == awaited_job_) awaited_job_ = 0;
     if (done->number == awaited_look_) awaited_look_ = 0;
->>>>>>> rep
   }
   if (const auto* report = std::get_if<ArmReported>(&*machine_event)) arm_moves_ = report->state.moving;
   machine_->on_event(event.time, *machine_event);
@@ -173,7 +159,8 @@ void Cart::stop_arm(Instant now) { devices_.arm.stop(now); }
 void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<const std::byte> arguments) {
   if (kind != JobKind::kIntegrate) {
     awaited_job_ = number;
-    job_started_ = now;
+  } else if (IntegrateArguments integrate; unpack(arguments, integrate) && integrate.at_view) {
+    awaited_look_ = number;
   }
   submit(kind, number, arguments, now);
 }
@@ -185,18 +172,8 @@ void Cart::submit(JobKind kind, std::uint32_t number, std::span<const std::byte>
   request_.virtual_duration = virtual_duration(kind);
   request_.size = static_cast<std::uint32_t>(arguments.size());
   std::copy(arguments.begin(), arguments.end(), request_.arguments.begin());
-<<<<<<< HEAD
   // The machine waits for two jobs at most, but in real time those that a pause left behind may still run.
   if (!runner_->submit(request_, now)) host_.ask_shutdown(Fault::kQueueFull);
-=======
-  if (kind != JobKind::kIntegrate) {
-    awaited_job_ = number;
-  } else if (IntegrateArguments integrate; unpack(arguments, integrate) && integrate.at_view) {
-    awaited_look_ = number;
-  }
-  // The machine has one awaited job and one integration at a time: the queue of eight cannot be full.
-  ENSURE(7221, runner_->submit(request_, now).has_value());
->>>>>>> rep
 }
 
 void Cart::set_timer(Instant, MachineTimer timer, Instant due) { timers_.set(static_cast<std::uint32_t>(timer), due); }

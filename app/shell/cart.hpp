@@ -90,10 +90,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   void on_event(const Event& event) override;
   void end_of_turn(Instant now) override;
 
-<<<<<<< HEAD
-  void watch_arm(const ArmReported& report);
   void submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now);
-=======
   /// Counts the time in which the arm stands and the machine waits for a job.
   void note_waiting(Instant now);
 
@@ -103,7 +100,6 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   [[nodiscard]] WallRecord wall_record() const;
   template <typename Draw>
   [[nodiscard]] std::vector<MapPicture> with_map_pictures(Draw draw) const;
->>>>>>> rep
 
   Config config_;
   CartOptions options_;
