@@ -12,7 +12,7 @@ int tiles_for(int pixels) { return (pixels + RangeImage::kTile - 1) / RangeImage
 }  // namespace
 
 RangeImage::RangeImage(int width, int height) : width_(width), height_(height) {
-  ENSURE(3041, width > 0 && height > 0);
+  ENSURE(3046, width > 0 && height > 0);
   Level level{tiles_for(width), tiles_for(height), {}};
   blocks_x_ = tiles_for(level.width);
   tile_farthest_m_.assign(static_cast<std::size_t>(blocks_x_ * tiles_for(level.height)) * kTilePixels, kNoRay);

@@ -99,6 +99,7 @@ Status Cart::run() {
   const Instant now = clock_->now();
   if (!phases_.empty() && !ended_) phases_.back().end = now;
   loop_.reset();
+  job_heap_peak_bytes_ = runner_->counters().heap_peak_bytes;
   runner_.reset();  // waits for a job that still works on what the record is made of
   if (const Status closed = journal_->close(now); !closed) return closed;
   return status;
@@ -256,7 +257,7 @@ WallRecord Cart::wall_record() const {
   wall.stall_s = stall_s_;
   wall.real_time = options_.real_time;
   wall.rss_bytes = resident_bytes();
-  wall.job_heap_peak_bytes = runner_->counters().heap_peak_bytes;
+  wall.job_heap_peak_bytes = job_heap_peak_bytes_;
   wall.library_bytes = resident_file_bytes();
   wall.workers = config_.workers;
   return wall;

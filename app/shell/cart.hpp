@@ -136,6 +136,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   std::uint32_t awaited_job_ = 0;
   std::uint32_t awaited_look_ = 0;  ///< integration of a look
   std::uint64_t loop_allocations_ = 0;
+  std::uint64_t job_heap_peak_bytes_ = 0;
   std::string started_;
   double wall_start_s_ = 0;
 };
