@@ -174,7 +174,10 @@ ValidateResult Workbench::validate() {
 std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
   std::vector<CalibrationViewRecord> records;
   const CameraIntrinsics& camera = color_.intrinsics();
+  const std::vector<std::size_t> counted = independent_observations();
   for (std::size_t i = 0; i < observations_.size(); ++i) {
+    const auto place = std::find(counted.begin(), counted.end(), i);
+    const auto k = static_cast<std::size_t>(place - counted.begin());  // its number in the solve
     const Observation& o = observations_[i];
     CalibrationViewRecord r;
     r.time_s = o.time_s;
@@ -183,8 +186,9 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
     r.detected_px = o.view.corners_px;
     r.rms_px = o.residual_rms_px;
     if (hand_eye_) {
-      if (i < hand_eye_->fits.size()) r.used = hand_eye_->fits[i].used;
-      if (i < hand_eye_->holdout_px.size()) r.holdout_px = hand_eye_->holdout_px[i];
+      r.counted = place != counted.end();
+      if (k < hand_eye_->fits.size()) r.used = hand_eye_->fits[k].used;
+      if (k < hand_eye_->holdout_px.size()) r.holdout_px = hand_eye_->holdout_px[k];
       const auto camera_T_board =
           (o.view.base_T_flange * hand_eye_->flange_T_camera).inverse() * hand_eye_->base_T_board;
       for (int c = 0; c < board_.corners(); ++c) {

@@ -58,7 +58,9 @@ std::string quality_table(const RunRecord& record) {
   table.row({"usable distance", fmt::format("{:.2f} m", h.usable_distance_m),
              "farthest object at which a 3σ error stays within the gripper's tolerance"});
   const auto gated = std::count_if(h.fits.begin(), h.fits.end(), [](const ViewFit& fit) { return !fit.used; });
-  table.row({"views", fmt::format("{} used, {} left out as wrong", h.views, gated),
+  const auto near = std::count_if(record.calibration_views.begin(), record.calibration_views.end(),
+                                  [](const CalibrationViewRecord& view) { return !view.counted; });
+  table.row({"views", fmt::format("{} used, {} left out as wrong, {} too near another", h.views, gated, near),
              fmt::format("closed form: {}", record.solver)});
   return table.html();
 }
@@ -103,6 +105,12 @@ bool is_whole(const GrayPicture& p) {
          p.pixels.size() == static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height);
 }
 
+std::string what_became_of(const CalibrationViewRecord& view) {
+  if (!view.counted) return " · not solved with: too near a later view";
+  if (!view.used) return " · left out as wrong";
+  return view.holdout_px ? fmt::format(" · held out {:.3f} px", *view.holdout_px) : std::string();
+}
+
 std::string view_figure(const CalibrationViewRecord& view, std::size_t number, const CameraIntrinsics& camera,
                         int width_max) {
   CornerPicture picture{std::max(1, camera.width), std::max(1, camera.height), 0, 0, {}};
@@ -118,9 +126,7 @@ std::string view_figure(const CalibrationViewRecord& view, std::size_t number, c
       "<a class=\"close\" href=\"#calibration-views\">close</a></figure>\n",
       number, corner_picture(view, picture),
       view.reprojected_px.empty() ? std::string("not solved") : fmt::format("{:.3f} px", view.rms_px),
-      view.used ? (view.holdout_px ? fmt::format(" · held out {:.3f} px", *view.holdout_px) : std::string())
-                : std::string(" · left out as wrong"),
-      view.time_s, flange.x(), flange.y(), flange.z());
+      what_became_of(view), view.time_s, flange.x(), flange.y(), flange.z());
 }
 
 }  // namespace

@@ -160,7 +160,8 @@ std::string view_rms_chart(std::span<const CalibrationViewRecord> views) {
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const double x = plot.x(static_cast<double>(i) + 1);
-    bar(x - slot * 0.4, slot * (held_out ? 0.4 : 0.8), views[i].rms_px, views[i].used ? kBlue : kGrey);
+    bar(x - slot * 0.4, slot * (held_out ? 0.4 : 0.8), views[i].rms_px,
+        views[i].counted && views[i].used ? kBlue : kGrey);
     if (views[i].holdout_px) bar(x, slot * 0.4, *views[i].holdout_px, kOrange);
     if (views.size() <= 20 || (i + 1) % 5 == 0)
       svg += text_at(x, plot.bottom() + 17, "middle", fmt::format("{}", i + 1));
@@ -180,7 +181,7 @@ std::string residual_chart(std::span<const CalibrationViewRecord> views) {
   std::vector<Eigen::Vector2d> residuals;
   std::vector<double> lengths;
   for (const CalibrationViewRecord& view : views) {
-    if (!view.used) continue;
+    if (!view.counted || !view.used) continue;
     for (std::size_t i = 0; i < std::min(view.detected_px.size(), view.reprojected_px.size()); ++i) {
       const Eigen::Vector2d r = view.detected_px[i] - view.reprojected_px[i];
       if (!r.allFinite()) continue;

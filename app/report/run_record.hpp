@@ -79,6 +79,7 @@ struct CalibrationViewRecord {
   std::vector<Eigen::Vector2d> reprojected_px;  ///< same order; empty when not solved
   double rms_px = 0;                            ///< of the above: no deviation of the arm is granted
   std::optional<double> holdout_px;  ///< the same under a solve that left this view out; empty: not validated
+  bool counted = true;               ///< false: too near a later view to tell anything of its own; not in the solve
   bool used = true;                  ///< false: the solve left it out as wrong
   GrayPicture picture;               ///< whole frame of the camera; empty without one (e.g. --sensor fast)
 };

@@ -68,8 +68,8 @@ std::string summary_section(const RunRecord& record) {
   if (!sentence.empty() && sentence[0] >= 'a' && sentence[0] <= 'z') {
     sentence[0] = static_cast<char>(sentence[0] - 'a' + 'A');
   }
-  std::string html =
-      fmt::format("<div class=\"banner {}\"><h2>{}</h2>\n<p>{}</p>\n", banner.style, banner.title, escape_html(sentence));
+  std::string html = fmt::format("<div class=\"banner {}\"><h2>{}</h2>\n<p>{}</p>\n", banner.style, banner.title,
+                                 escape_html(sentence));
   if (record.hand_eye && record.hand_eye->verdict == Verdict::kRejected) {
     html += "<ul>\n";
     for (const std::string& reason : record.hand_eye->reasons) html += "<li>" + escape_html(reason) + "</li>\n";

@@ -26,6 +26,7 @@ Status write_calibration_recording(const std::string& folder, const RunRecord& r
   std::vector<std::pair<std::string, std::string>> texts;
   for (std::size_t i = 0; i < record.calibration_views.size(); ++i) {
     const CalibrationViewRecord& view = record.calibration_views[i];
+    if (!view.counted) continue;  // so that the recording solves to what the run solved
     const std::string image = fmt::format("images/{:02}.png", i + 1);
     poses += pose_row(image, view.base_T_flange);
     pictures = pictures && view.picture.width > 0;

@@ -52,7 +52,7 @@ double sweep_start_s() {
   static const double start_s = [] {
     const JobFolder folder;
     REQUIRE(folder.run_job("run", {"--only", "calibrate"}).exit_code == 0);
-    return phase_start_s(folder.read_json("run/result.json"), "Conclude");
+    return phase_start_s(folder.read_json("run/result.json"), "Park");
   }();
   return start_s;
 }
