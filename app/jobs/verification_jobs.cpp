@@ -23,6 +23,18 @@ HandEyeResult result_of(const StoredCalibration& stored, double tolerance_m) {
   return r;
 }
 
+std::vector<PosePair> pairs_of(std::span<const Observation> observations) {
+  std::vector<PosePair> pairs;
+  for (const Observation& o : observations) pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board});
+  return pairs;
+}
+
+VerificationLimits limits_of(const Config& config) {
+  VerificationLimits limits;
+  limits.views_min = config.calibration.verify_views;
+  return limits;
+}
+
 }  // namespace
 
 /// The noise that the calibration was made with, the arm's not below what the configuration expects: few views know the
@@ -45,8 +57,7 @@ std::optional<Path> Workbench::best_verification_view(const FromHere& here, cons
   options.step = here.step;
   options.speed = limits_;
   options.criterion = DesignCriterion::kVolume;
-  options.limits.margin_px = 60;    // 5 mm and 1 degree move the board by 15 px at 0.6 m
-  options.different_min_rad = 0.3;  // the arm's deviations of nearer views are not independent
+  options.limits.margin_px = 60;  // 5 mm and 1 degree move the board by 15 px at 0.6 m
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
   const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, model, information, taken};
@@ -78,19 +89,18 @@ VerificationViewResult Workbench::next_verification_view(const FromHere& here) {
   std::optional<Path> path;
   if (!observations_.empty()) {
     const HandEyeClaim stated = claim();
-    std::vector<PosePair> pairs;
-    for (const Observation& o : observations_) pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board});
     const ViewDesignModel model{color_.intrinsics(),
                                 board_,
                                 stated.flange_T_camera,
-                                mean_board_pose(pairs, stated.flange_T_camera),
+                                mean_board_pose(pairs_of(observations_), stated.flange_T_camera),
                                 stated.corner_sigma_px,
                                 stated.arm_sigma};
     Matrix12d information = prior_information();
     for (const Observation& o : observations_) information += view_information(model, o.view.base_T_flange);
-    if (const VerificationLimits limits; static_cast<int>(observations_.size()) >= limits.views_min) {
-      const DetectableError detectable = detectable_error(predicted_covariance(information), stated.covariance,
-                                                          static_cast<int>(observations_.size()), limits);
+    const VerificationLimits limits = limits_of(config_);
+    if (const auto views = static_cast<int>(observations_.size()); views >= limits.views_min) {
+      const DetectableError detectable =
+          detectable_error(predicted_covariance(information), stated.covariance, views, limits);
       result.target_met = detectable.within(limits);
       result.detectable_mm = 1000 * detectable.translation_m;
       result.detectable_mrad = 1000 * detectable.rotation_rad;
@@ -108,7 +118,9 @@ VerifyResult Workbench::verify_calibration() {
   HandEyeResult hand_eye = result_of(*facts_.stored, config_.calibration.gripper_tolerance_m);
   VerifiedCalibration record{*facts_.stored, static_cast<int>(verification_looks_), std::nullopt};
   hand_eye.reasons = covariance_reasons(solve_options().limits, hand_eye);
-  const auto verification = verify_hand_eye(color_.intrinsics(), board_, views(), claim());
+  std::vector<CalibrationView> views;
+  for (const Observation& o : observations_) views.push_back(o.view);
+  const auto verification = verify_hand_eye(color_.intrinsics(), board_, views, claim(), limits_of(config_));
   if (verification) {
     record.verification = *verification;
     hand_eye.base_T_board = verification->base_T_board;
@@ -120,6 +132,9 @@ VerifyResult Workbench::verify_calibration() {
     result.chi2_limit = verification->chi2_limit;
     result.residual_rms_px = verification->residual_rms_px;
   } else {
+    if (!observations_.empty()) {
+      hand_eye.base_T_board = mean_board_pose(pairs_of(observations_), hand_eye.flange_T_camera);
+    }
     hand_eye.reasons.emplace_back(verification.error().detail());
   }
   if (const std::size_t missed = verification_looks_ - observations_.size(); missed > 0 && !hand_eye.reasons.empty()) {

@@ -39,7 +39,7 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
   if (facts.stored) {
     const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth);
-    if (!fits) return std::unexpected(fits.error());
+    if (!fits) return failure(fits.error().fault, "{}: {}", config.calibration.stored, fits.error().detail());
   }
   const GridGeometry geometry =
       GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
