@@ -13,6 +13,7 @@
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"
 #include "app/shell/calibration_recording.hpp"
+#include "app/shell/job_settings.hpp"
 #include "app/shell/cart.hpp"
 #include "app/shell/replay.hpp"
 #include "hal/sim/simulated_cell.hpp"
@@ -137,8 +138,15 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
   if (record.hand_eye) {
     const Eigen::Vector3d t = 1000 * record.hand_eye->flange_T_camera.translation();
     const Eigen::Vector3d s = 1000 * record.hand_eye->sigma_translation_m;
-    narrator.line(fmt::format("hand-eye  x {:.2f} ± {:.2f}  y {:.2f} ± {:.2f}  z {:.2f} ± {:.2f} mm from {} views",
-                              t.x(), s.x(), t.y(), s.y(), t.z(), s.z(), record.hand_eye->views));
+    narrator.line(fmt::format("hand-eye  x {:.2f} ± {:.2f}  y {:.2f} ± {:.2f}  z {:.2f} ± {:.2f} mm {}from {} views",
+                              t.x(), s.x(), t.y(), s.y(), t.z(), s.z(), record.verified ? "as stored, " : "",
+                              record.hand_eye->views));
+    if (record.verified && record.verified->verification) {
+      const Verification& v = *record.verified->verification;
+      narrator.line(fmt::format("verified  on {} views: chi-square {:.1f}, allowed {:.1f}; {:.2f} px, {:.2f} mm RMS",
+                                v.views.size(), v.chi2, v.chi2_limit, v.residual_rms_px, v.residual_rms_m * 1e3));
+    }
+    for (const std::string& reason : record.hand_eye->reasons) narrator.line("rejected  " + reason);
   }
   if (record.mapping) {
     const VoxelCounts& v = record.mapping->voxels;
@@ -160,6 +168,20 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
   }
 }
 
+/// The stored calibration for the scopes that verify one.
+Result<std::optional<StoredCalibration>> stored_calibration(RunScope scope, const Config& config) {
+  if (scope != RunScope::kMap && scope != RunScope::kVerify) return std::optional<StoredCalibration>();
+  if (config.calibration.stored == "none") {
+    return failure(Fault::kUsage,
+                   "--only {} needs a stored calibration: --calibration FILE, the hand_eye.yaml of a run (`firstlook "
+                   "run --only calibrate --out DIR` makes one), or calibration.stored in the configuration",
+                   name_of(scope));
+  }
+  auto read = read_hand_eye(config.calibration.stored);
+  if (!read) return std::unexpected(read.error());
+  return std::optional(*read);
+}
+
 int run_job(const RunCommand& command) {
   auto loaded = load_config(command.sources);
   if (!loaded) return fail(loaded.error());
@@ -170,6 +192,8 @@ int run_job(const RunCommand& command) {
   } else {
     narrator.line(fmt::format("running in the simulated cell {}", config.cell));
   }
+  const auto stored = stored_calibration(command.scope, config);
+  if (!stored) return fail(stored.error());
   const std::string folder =
       command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
   if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
@@ -182,7 +206,7 @@ int run_job(const RunCommand& command) {
 
   if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
   const CartDevices devices{world.arm(), world.color(), world.depth(), world.pendant(), world.panel()};
-  const CellFacts facts{world.description().start_rad, world.description().camera_T_depth};
+  const CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored};
   CartOptions options;
   options.scope = command.scope;
   options.real_time = command.real_time;

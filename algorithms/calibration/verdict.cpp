@@ -104,15 +104,22 @@ int spread_of_subsets(const Validation& validation, const HandEyeOptions& option
   return options.subset_solves - solved;
 }
 
+struct Figure {
+  double value, limit;
+  double to_text;  ///< factor from SI to `unit`
+  const char* text;
+  const char* unit;
+};
+
+void reject_above(const Figure& f, std::vector<std::string>& reasons) {
+  if (f.value <= f.limit) return;
+  reasons.push_back(fmt::format("{} {:.3g} {}, allowed {:.3g} {}", f.text, f.value * f.to_text, f.unit,
+                                f.limit * f.to_text, f.unit));
+}
+
 void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, HandEyeResult& result) {
   std::vector<std::string>& reasons = result.reasons;
   reasons.clear();
-  const auto reject_above = [&](double value, double limit, double to_text, const char* text, const char* unit) {
-    if (!(value <= limit)) {
-      reasons.push_back(
-          fmt::format("{} {:.3g} {}, allowed {:.3g} {}", text, value * to_text, unit, limit * to_text, unit));
-    }
-  };
   const auto gated = std::count_if(result.fits.begin(), result.fits.end(), [](const ViewFit& f) { return !f.used; });
   if (result.views < limits.views_min) {
     reasons.push_back(fmt::format("{} usable views, {} are the least", result.views, limits.views_min));
@@ -120,26 +127,21 @@ void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, H
   if (static_cast<double>(gated) > limits.gated_views_max * static_cast<double>(result.fits.size())) {
     reasons.push_back(fmt::format("{} of {} views contradict the others", gated, result.fits.size()));
   }
-  reject_above(result.sigma_translation_m.maxCoeff(), limits.sigma_translation_max_m, 1e3, "sigma of translation",
-               "mm");
-  reject_above(result.sigma_rotation_rad.maxCoeff(), limits.sigma_rotation_max_rad, 1e3, "sigma of rotation", "mrad");
-  reject_above(3 * point_sigma(result.flange_T_camera, result.covariance, limits.mapping_distance_m),
-               limits.voxel_size_m / 2, 1e3, "3 sigma at the mapping distance", "mm");
   if (result.holdout_rms_m == 0) {
     reasons.emplace_back("too few views to hold any out");
   } else {
-    reject_above(result.holdout_rms_px, limits.holdout_rms_max_px, 1, "held-out views miss by RMS", "px");
-    reject_above(result.holdout_rms_m, limits.holdout_rms_max_m, 1e3, "held-out views see the board off by RMS", "mm");
+    reject_above({result.holdout_rms_px, limits.holdout_rms_max_px, 1, "held-out views miss by RMS", "px"}, reasons);
+    reject_above(
+        {result.holdout_rms_m, limits.holdout_rms_max_m, 1e3, "held-out views see the board off by RMS", "mm"},
+        reasons);
   }
-  reject_above(result.subset_spread_m, limits.subset_spread_max_m, 1e3, "solves on subsets of the views spread by RMS",
-               "mm");
+  reject_above({result.subset_spread_m, limits.subset_spread_max_m, 1e3,
+                "solves on subsets of the views spread by RMS", "mm"},
+               reasons);
   if (2 * failed_subsets > subset_solves) {
     reasons.push_back(fmt::format("{} of {} solves on subsets of the views failed", failed_subsets, subset_solves));
   }
-  if (result.usable_distance_m < limits.usable_distance_min_m) {
-    reasons.push_back(fmt::format("usable distance {:.2f} m for a tolerance of {:.0f} mm, least {:.2f} m",
-                                  result.usable_distance_m, limits.tolerance_m * 1e3, limits.usable_distance_min_m));
-  }
+  for (std::string& reason : covariance_reasons(limits, result)) reasons.push_back(std::move(reason));
   result.verdict = reasons.empty() ? Verdict::kAccepted : Verdict::kRejected;
 }
 
@@ -209,6 +211,23 @@ double squared_error_px(const CameraIntrinsics& camera, const BoardSpec& board, 
 }
 
 }  // namespace
+
+std::vector<std::string> covariance_reasons(const VerdictLimits& limits, const HandEyeResult& result) {
+  std::vector<std::string> reasons;
+  reject_above({result.sigma_translation_m.maxCoeff(), limits.sigma_translation_max_m, 1e3, "sigma of translation",
+                "mm"},
+               reasons);
+  reject_above({result.sigma_rotation_rad.maxCoeff(), limits.sigma_rotation_max_rad, 1e3, "sigma of rotation", "mrad"},
+               reasons);
+  reject_above({3 * point_sigma(result.flange_T_camera, result.covariance, limits.mapping_distance_m),
+                limits.voxel_size_m / 2, 1e3, "3 sigma at the mapping distance", "mm"},
+               reasons);
+  if (result.usable_distance_m < limits.usable_distance_min_m) {
+    reasons.push_back(fmt::format("usable distance {:.2f} m for a tolerance of {:.0f} mm, least {:.2f} m",
+                                  result.usable_distance_m, limits.tolerance_m * 1e3, limits.usable_distance_min_m));
+  }
+  return reasons;
+}
 
 double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
                         const Transform<Flange, Camera>& flange_T_camera, const Transform<Base, Board>& base_T_board) {

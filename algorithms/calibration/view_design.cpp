@@ -83,6 +83,15 @@ double design_cost(const Matrix6d& covariance, double lever_m) {
   return covariance.topLeftCorner<3, 3>().trace() + lever_m * lever_m * covariance.bottomRightCorner<3, 3>().trace();
 }
 
+double design_volume(const Matrix6d& covariance) {
+  constexpr double kUnit_m = 1e-3, kUnit_rad = 1e-3;  // of the scaled matrix: keeps its entries near one
+  Vector6d scale;
+  scale << Eigen::Vector3d::Constant(1 / kUnit_m), Eigen::Vector3d::Constant(1 / kUnit_rad);
+  const Matrix6d scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
+  const Vector6d pivots = scaled.ldlt().vectorD().cwiseMax(0);
+  return kUnit_m * kUnit_rad * std::exp(pivots.array().log().sum() / 6);
+}
+
 double predicted_cost(const ViewDesignModel& model, const Matrix12d& information,
                       const Transform<Base, Flange>& candidate, double lever_m) {
   return design_cost(predicted_covariance(information + view_information(model, candidate)), lever_m);

@@ -49,6 +49,10 @@ enum class ViewFault : std::uint8_t { kNone, kBehind, kOutOfImage, kTilt, kDista
 /// m^2.
 [[nodiscard]] double design_cost(const Matrix6d& covariance, double lever_m = 1.0);
 
+/// D-optimal cost of a covariance: the sixth root of its determinant, m rad. Unlike design_cost it tells views
+/// apart while some direction is still open: that direction's share is the same factor for all of them.
+[[nodiscard]] double design_volume(const Matrix6d& covariance);
+
 /// design_cost after one more view at `candidate`: smaller is better. About 25 us.
 [[nodiscard]] double predicted_cost(const ViewDesignModel& model, const Matrix12d& information,
                                     const Transform<Base, Flange>& candidate, double lever_m = 1.0);

@@ -33,6 +33,11 @@ struct Search {
   int considered = 0;
 };
 
+double cost_of(const Matrix6d& covariance, const CalibrationViewOptions& options) {
+  return options.criterion == DesignCriterion::kVolume ? design_volume(covariance)
+                                                       : design_cost(covariance, options.cost_lever_m);
+}
+
 bool is_new(const Search& s, const JointVector& q) {
   return std::all_of(s.inputs.taken.begin(), s.inputs.taken.end(), [&](const JointVector& other) {
     return joint_distance_rad(q, other) >= s.options.different_min_rad;
@@ -48,7 +53,8 @@ void consider(Search& s, const JointVector& q) {
   if (check_view(in.model, frames.flange(), s.options.limits) != ViewFault::kNone) return;
   if (!configuration_is_free(in.arm, in.body, in.space, in.clearance, q, kTargetMargin_m)) return;
   if (hides_board(in.model, place(in.body.capsules, frames), frames.flange())) return;
-  const double cost = predicted_cost(in.model, in.information, frames.flange(), s.options.cost_lever_m);
+  const Matrix12d information = in.information + view_information(in.model, frames.flange());
+  const double cost = cost_of(predicted_covariance(information), s.options);
   s.feasible.push_back({q, cost});
 }
 
@@ -147,7 +153,7 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
   choice.feasible = static_cast<int>(s.feasible.size());
   choice.before = predicted_covariance(inputs.information);
   choice.after = choice.before;
-  const double cost_max = design_cost(choice.before, options.cost_lever_m) * (1 - options.cost_drop_min);
+  const double cost_max = cost_of(choice.before, options) * (1 - options.cost_drop_min);
   int plans = 0;
   for (const Candidate& candidate : s.feasible) {
     if (candidate.cost > cost_max) {

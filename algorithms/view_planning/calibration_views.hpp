@@ -21,6 +21,11 @@ struct CalibrationViewInputs {
   std::span<const JointVector> taken;  ///< configurations of the views taken
 };
 
+enum class DesignCriterion : std::uint8_t {
+  kCost,    ///< design_cost: the transform as exact as can be
+  kVolume,  ///< design_volume: for the first views, which leave some direction open
+};
+
 struct CalibrationViewOptions {
   std::uint64_t seed = 1;
   std::uint32_t step = 0;        ///< number of this choice: other candidates each time
@@ -32,6 +37,7 @@ struct CalibrationViewOptions {
   double distance_max_m = 0.8;
   double tilt_max_rad = 0.785;                      ///< of aimed poses: 45 degrees
   double different_min_rad = kSharedDeviation_rad;  ///< joint distance to every view taken
+  DesignCriterion criterion = DesignCriterion::kCost;
   double cost_lever_m = 1.0;                        ///< design_cost: rotation counts as displacement at this distance
   double cost_drop_min = 0.005;                     ///< a view must lower the cost by this share
   int plans_max = 12;                               ///< best candidates that the planner may try
@@ -61,7 +67,7 @@ struct PredictedSigma {
 };
 [[nodiscard]] PredictedSigma predicted_sigma(const Matrix6d& covariance);
 
-/// The reachable view with the smallest A-optimal cost. The same arguments give the same choice.
+/// The reachable view with the smallest cost by `options.criterion`. The same arguments give the same choice.
 /// Errors: kStartBlocked when `current` is not free.
 [[nodiscard]] Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs& inputs, Planner& planner,
                                                                   const JointVector& current,

@@ -41,10 +41,17 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   RunCommand run;
   ConfigFlags run_flags;
-  std::string only = "everything", sensor = "full";
+  std::string only = "everything", sensor = "full", calibration, views = "firstlook";
   CLI::App* run_app = app.add_subcommand("run", "the whole job, in a simulated cell");
   run_flags.add_to(*run_app);
-  run_app->add_option("--only", only, "a part of the job")->check(CLI::IsMember({"everything", "calibrate"}));
+  run_app->add_option("--only", only, "a part of the job; map and verify test a stored calibration first")
+      ->check(CLI::IsMember({"everything", "calibrate", "map", "verify"}));
+  run_app->add_option("--calibration", calibration, "hand_eye.yaml of an earlier run, for --only map and --only verify");
+  run_app->add_option("--views", views, "how the views for the map are chosen: firstlook is all there is")
+      ->check([](const std::string& name) {
+        return name == "firstlook" ? std::string()
+                                   : fmt::format("'{}' is not there; the views are chosen by: firstlook", name);
+      });
   run_app->add_option("--sensor", sensor, "full pictures, or fast: coarser depth and projected corners")
       ->check(CLI::IsMember({"full", "fast"}));
   run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
@@ -96,6 +103,13 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
     run.sources = run_flags.sources();
     run.cell_given = !run_flags.cell.empty();
     run.scope = *find_scope(only);
+    if (!calibration.empty()) {
+      if (run.scope != RunScope::kMap && run.scope != RunScope::kVerify) {
+        fmt::print(stderr, "--calibration: only --only map and --only verify use a stored calibration\n");
+        return {std::nullopt, 2};
+      }
+      run.sources.flags.push_back({"calibration.stored", calibration, "--calibration"});
+    }
     run.fast_sensor = sensor == "fast";
     return {run, 0};
   }

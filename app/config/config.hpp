@@ -80,6 +80,8 @@ struct Config {
     double subset_spread_max_mm = 3.0;
     double gripper_tolerance_m = 0.01;
     double usable_distance_min_m = 0.3;
+    std::string stored = "none";  ///< hand_eye.yaml of an earlier run; none: no calibration is stored
+    int verify_views = 3;         ///< views that a stored calibration is tested on at least
     bool operator==(const Calibration&) const = default;
   } calibration;
 

@@ -143,6 +143,14 @@ void add_calibration_keys(Keys& keys, Config& c) {
                   10,
                   {},
                   "limit of the verdict: distance at which that tolerance must still hold"});
+  keys.push_back({"calibration.stored",
+                  &k.stored,
+                  0,
+                  0,
+                  {},
+                  "hand_eye.yaml of an earlier run, for --only map and --only verify; none: there is none"});
+  keys.push_back(
+      {"calibration.verify_views", &k.verify_views, 3, 8, {}, "views to test a stored calibration on at least"});
 }
 
 void add_map_keys(Keys& keys, Config& c) {

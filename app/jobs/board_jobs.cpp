@@ -70,6 +70,7 @@ void Workbench::keep_picture(std::size_t observation) {
 
 DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   DetectResult result;
+  if (arguments.purpose == BoardLook::kVerify) ++verification_looks_;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
   const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners->corners_px);
@@ -87,7 +88,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   if (arguments.purpose == BoardLook::kIdentify && identify_reference_) {
     result.changed = compare_views(color_.intrinsics(), board_, *identify_reference_, *pose).changed;
   }
-  if (arguments.purpose == BoardLook::kCollect &&
+  if ((arguments.purpose == BoardLook::kCollect || arguments.purpose == BoardLook::kVerify) &&
       observations_.size() < static_cast<std::size_t>(config_.calibration.views_max)) {
     Observation o;
     o.joints_rad = last.at_rad;

@@ -65,6 +65,10 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
     case JobKind::kCheckBoard:
       return run<DetectArguments>(request, result, failed_,
                                   [&b](const DetectArguments& a) { return b.check_board(a); });
+    case JobKind::kNextVerificationView:
+      return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.next_verification_view(a); });
+    case JobKind::kVerifyCalibration:
+      return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.verify_calibration(); });
     case JobKind::kSummarize:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.summarize(); });
     case JobKind::kForgetKnownFree:
@@ -90,11 +94,14 @@ Duration virtual_duration(JobKind kind) {
     case JobKind::kCheckBoard:
       return milliseconds(150);
     case JobKind::kNextCalibrationView:
+    case JobKind::kNextVerificationView:
       return milliseconds(500);
     case JobKind::kSolve:
       return milliseconds(300);
     case JobKind::kValidate:
       return milliseconds(1500);
+    case JobKind::kVerifyCalibration:
+      return milliseconds(50);
     case JobKind::kIntegrate:
     case JobKind::kForgetKnownFree:
       return milliseconds(80);

@@ -37,6 +37,10 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
                                                    WorkerPool& workers) {
   const auto arm = find_arm_model(config.arm.model);
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
+  if (facts.stored) {
+    const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth);
+    if (!fits) return failure(fits.error().fault, "{}: {}", config.calibration.stored, fits.error().detail());
+  }
   const GridGeometry geometry =
       GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
   const std::size_t needed = VoxelMap::required_bytes(geometry) + 3 * geometry.count();

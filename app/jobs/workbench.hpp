@@ -22,6 +22,7 @@
 #include "algorithms/view_planning/sweep.hpp"
 #include "algorithms/vision/board_pose.hpp"
 #include "app/config/config.hpp"
+#include "app/dataset/hand_eye_file.hpp"
 #include "app/jobs/published_space.hpp"
 #include "app/machine/job_types.hpp"
 #include "app/report/map_pictures.hpp"
@@ -36,6 +37,7 @@ namespace firstlook {
 struct CellFacts {
   JointVector start_rad;                    ///< where the sweep turns around, and where the job parks
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
+  std::optional<StoredCalibration> stored;  ///< of an earlier job; for scopes that verify it
 };
 
 /// One stop at which the board was seen for the calibration.
@@ -63,6 +65,8 @@ class Workbench {
   [[nodiscard]] CalibrationViewResult next_calibration_view(const FromHere& here);
   [[nodiscard]] SolveResult solve();
   [[nodiscard]] ValidateResult validate();
+  [[nodiscard]] VerificationViewResult next_verification_view(const FromHere& here);
+  [[nodiscard]] VerifyResult verify_calibration();
   [[nodiscard]] IntegrateResult integrate(const IntegrateArguments& arguments);
   [[nodiscard]] NextViewResult next_sweep_view(const FromHere& here);
   [[nodiscard]] NextViewResult next_view(const FromHere& here);
@@ -77,6 +81,8 @@ class Workbench {
   [[nodiscard]] std::vector<MappingViewRecord> mapping_views() const;
   /// Voxels of the reach zone.
   [[nodiscard]] VoxelCounts zone_counts() const;
+  [[nodiscard]] const std::optional<VerifiedCalibration>& verified() const { return verified_; }
+  [[nodiscard]] const CellFacts& facts() const { return facts_; }
   [[nodiscard]] const std::vector<RemainingRecord>& remaining() const { return remaining_; }
   [[nodiscard]] const VoxelMap& map() const { return map_; }
   [[nodiscard]] bool swept() const { return !sweeping_; }
@@ -127,6 +133,10 @@ class Workbench {
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
+  [[nodiscard]] HandEyeClaim claim() const;
+  [[nodiscard]] std::optional<Path> best_verification_view(const FromHere& here, const ViewDesignModel& model,
+                                                           const Matrix12d& information);
+  [[nodiscard]] std::optional<Path> next_turn(const FromHere& here);
   [[nodiscard]] bool is_frozen(const hal::Frame& frame, IntegrateResult& result);
   void begin_mapping();
   void rebuild_free_space(double now_s);
@@ -163,6 +173,10 @@ class Workbench {
   std::size_t bootstrap_next_ = 0;
   std::size_t bootstrap_centers_ = 0;  ///< views around which bootstrap views were made
   std::optional<HandEyeResult> hand_eye_;
+  std::uint32_t verification_looks_ = 0;  ///< with or without the board
+  std::optional<Turns> turns_;            ///< around the first view, when the board was not where it should be seen
+  std::size_t turns_next_ = 0;
+  std::optional<VerifiedCalibration> verified_;
 
   VoxelMap map_;
   Inserter inserter_;

@@ -28,8 +28,10 @@ enum class JobKind : std::uint16_t {
   kCheckBoard,
   kSummarize,
   kForgetKnownFree,
+  kNextVerificationView,
+  kVerifyCalibration,
 };
-inline constexpr JobKind kLastJobKind = JobKind::kForgetKnownFree;
+inline constexpr JobKind kLastJobKind = JobKind::kVerifyCalibration;
 
 /// What people read: "choosing the next view".
 [[nodiscard]] constexpr std::string_view name_of(JobKind kind) {
@@ -47,7 +49,9 @@ inline constexpr JobKind kLastJobKind = JobKind::kForgetKnownFree;
       "certifying a path",
       "checking the board",
       "summing up what remains unknown",
-      "forgetting what was known free"};
+      "forgetting what was known free",
+      "choosing the next view to test the calibration from",
+      "testing the stored calibration"};
   return kNames[static_cast<std::size_t>(kind) - 1];
 }
 
@@ -72,7 +76,7 @@ enum class MotionPhase : std::uint8_t {
   kMapping,            ///< calibrated camera, known free space of the map
 };
 
-struct NoArguments {      ///< kSolve, kValidate, kSummarize, kForgetKnownFree; also the last one's result
+struct NoArguments {      ///< kSolve, kValidate, kVerifyCalibration, kSummarize, kForgetKnownFree; also the last one's result
   std::uint8_t none = 0;  // a value takes at least one byte
   template <typename Archive>
   void fields(Archive& a) {
@@ -80,7 +84,8 @@ struct NoArguments {      ///< kSolve, kValidate, kSummarize, kForgetKnownFree; 
   }
 };
 
-struct FromHere {  ///< kLocateViews, kIdentifyMotions, kNextCalibrationView, kNextSweepView, kNextView
+/// kLocateViews, kIdentifyMotions, kNextCalibrationView, kNextVerificationView, kNextSweepView, kNextView
+struct FromHere {
   JointVector at_rad;
   std::uint32_t step = 0;  ///< counts the calls of this kind; seeds the candidates
   double now_s = 0;
@@ -132,7 +137,7 @@ struct PosedFrame {
   }
 };
 
-enum class BoardLook : std::uint8_t { kLocate, kIdentify, kCollect, kConclude };
+enum class BoardLook : std::uint8_t { kLocate, kIdentify, kCollect, kConclude, kVerify };
 
 struct DetectArguments {  ///< kDetectBoard: detect in each frame, average, remember as view number `view` when found
   BoardLook purpose = BoardLook::kLocate;
@@ -190,6 +195,30 @@ struct ValidateResult {
   template <typename Archive>
   void fields(Archive& a) {
     a(accepted, holdout_rms_px, usable_distance_m, clearance_m);
+  }
+};
+
+struct VerificationViewResult {
+  bool found = false;       ///< false: no other view of the board can be reached
+  bool target_met = false;  ///< the views so far would show an error of the sizes that matter
+  Route path;
+  double detectable_mm = 0;  ///< smallest errors of the hand-eye transform that the views so far would surely show
+  double detectable_mrad = 0;  ///< both 0 until there are views enough to say
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(found, target_met, path, detectable_mm, detectable_mrad);
+  }
+};
+
+struct VerifyResult {
+  bool accepted = false;
+  double chi2 = 0;
+  double chi2_limit = 0;
+  double residual_rms_px = 0;
+  double clearance_m = 0;  ///< of safety rule 5, with this calibration
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(accepted, chi2, chi2_limit, residual_rms_px, clearance_m);
   }
 };
 

@@ -24,7 +24,7 @@ struct MachineSettings {
   int frames_per_view = 3;
   int calibration_views_min = 8;
   int calibration_views_max = 30;
-  int verify_views = 3;  ///< a stored calibration is looked at from so many views before it is used
+  int verify_views = 3;  ///< views of the board that a stored calibration is tested on at least
   int explore_views_max = 60;
   double frames_while_moving_hz = 2;
   double path_deviation_max_m = 0.02;

@@ -20,12 +20,12 @@ constexpr std::array kFromRunning = {Transition{"pause", kPaused},
                                      Transition{"stop, link lost, stale stream", kStopped},
                                      Transition{"unexpected event", kFaulted}, Transition{"cannot go on", kPark}};
 constexpr std::array kFromLocate = {Transition{"board seen", kIdentifyLink},
-                                    Transition{"board seen, calibration stored", kCollect}};
+                                    Transition{"board seen, calibration stored", kVerifyCalibration}};
 constexpr std::array kFromIdentify = {Transition{"camera on the flange", kCollect}};
-constexpr std::array kFromCollect = {Transition{"sigma reached or no view helps", kSolve},
-                                     Transition{"calibration stored", kValidate}};
+constexpr std::array kFromCollect = {Transition{"sigma reached or no view helps", kSolve}};
 constexpr std::array kFromSolve = {Transition{"solved", kValidate}};
 constexpr std::array kFromValidate = {Transition{"accepted", kSweep}};
+constexpr std::array kFromVerify = {Transition{"stored calibration holds", kSweep}};
 constexpr std::array kFromSweep = {Transition{"nothing more in the sweep", kChoose}};
 constexpr std::array kFromChoose = {Transition{"view chosen", kPlan}, Transition{"nothing more to see", kVerifyBoard},
                                     Transition{"surroundings not free", kLook}};
@@ -36,9 +36,10 @@ constexpr std::array kFromPark = {Transition{"parked", kReport}};
 constexpr std::array kFromReport = {Transition{"reported", kReady}};
 constexpr std::array kFromPaused = {
     Transition{"resume", kLocateBoard}, Transition{"resume", kIdentifyLink}, Transition{"resume", kCollect},
-    Transition{"resume", kSolve},       Transition{"resume", kValidate},     Transition{"resume", kSweep},
-    Transition{"resume", kChoose},      Transition{"resume", kVerifyBoard},  Transition{"resume", kPark},
-    Transition{"resume", kReport},      Transition{"stop", kStopped},        Transition{"unexpected event", kFaulted}};
+    Transition{"resume", kSolve},       Transition{"resume", kValidate},     Transition{"resume", kVerifyCalibration},
+    Transition{"resume", kSweep},       Transition{"resume", kChoose},       Transition{"resume", kVerifyBoard},
+    Transition{"resume", kPark},        Transition{"resume", kReport},       Transition{"stop", kStopped},
+    Transition{"unexpected event", kFaulted}};
 
 constexpr std::array kRows = {
     StateRow{kBoot, kNone, "Boot", states::enter_boot, nullptr, states::on_boot, kFromBoot},
@@ -52,6 +53,8 @@ constexpr std::array kRows = {
     StateRow{kCollect, kCalibrate, "Collect", states::enter_collect, nullptr, states::on_collect, kFromCollect},
     StateRow{kSolve, kCalibrate, "Solve", states::enter_solve, nullptr, states::on_solve, kFromSolve},
     StateRow{kValidate, kCalibrate, "Validate", states::enter_validate, nullptr, states::on_validate, kFromValidate},
+    StateRow{kVerifyCalibration, kRunning, "VerifyCalibration", states::enter_verify_calibration, nullptr,
+             states::on_verify_calibration, kFromVerify},
     StateRow{kSweep, kRunning, "Sweep", states::enter_sweep, nullptr, states::on_sweep, kFromSweep},
     StateRow{kExplore, kRunning, "Explore", nullptr, nullptr, nullptr, {}},
     StateRow{kChoose, kExplore, "Choose", states::enter_choose, nullptr, states::on_choose, kFromChoose},

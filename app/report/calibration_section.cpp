@@ -138,7 +138,8 @@ std::string hand_eye_section(const RunRecord& record) {
   const HandEyeResult& h = *record.hand_eye;
   std::string body =
       "<p>Pose of the camera (optical frame: z forward, x right, y down) in the flange <code>tool0</code>.</p>\n";
-  body += transform_table(h) + "<h3>How good it is</h3>\n" + quality_table(record);
+  body += transform_table(h) + "<h3>How good it is</h3>\n";
+  body += record.verified ? verification_table(record) : quality_table(record);
   body += snippets(h);
   return section("hand-eye", "Where the camera sits on the arm", body);
 }
@@ -150,9 +151,11 @@ std::string calibration_views_section(const RunRecord& record) {
   body +=
       "<p class=\"hint\"><span class=\"key detected\">○</span> detected corners, <span class=\"key "
       "reprojected\">+</span> "
-      "corners as the calibration predicts them from where the arm says it stood. The solve grants each view a small "
-      "deviation of the arm, so these figures are larger than its own reprojection error. Held out is the same figure "
-      "under a solve without this view. Select a picture to enlarge it.</p>\n<div class=\"shots\">\n";
+      "corners as the calibration predicts them from where the arm says it stood. ";
+  body += record.verified ? "These views tested the stored calibration and took no part in it. "
+                          : "The solve grants each view a small deviation of the arm, so these figures are larger than "
+                            "its own reprojection error. Held out is the same figure under a solve without this view. ";
+  body += "Select a picture to enlarge it.</p>\n<div class=\"shots\">\n";
   constexpr int kWidthMax = 640;  // about 25 kB each: the page stays below some 3 MB with 60 of them
   for (std::size_t i = 0; i < views.size(); ++i) body += view_figure(views[i], i + 1, record.intrinsics, kWidthMax);
   return section("calibration-views", "Views of the board", body + "</div>\n");

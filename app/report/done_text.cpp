@@ -12,6 +12,12 @@ std::string calibration_text(const HandEyeResult& h) {
                      h.sigma_translation_m.maxCoeff() * 1e3, h.sigma_rotation_rad.maxCoeff() * 1e3, h.views);
 }
 
+std::string verified_text(const HandEyeResult& h, const VerifiedCalibration& v) {
+  return fmt::format("stored calibration ({:.2f} mm and {:.2f} mrad, 1 sigma, worst axis) holds on {} views of the board",
+                     h.sigma_translation_m.maxCoeff() * 1e3, h.sigma_rotation_rad.maxCoeff() * 1e3,
+                     v.verification ? v.verification->views.size() : 0);
+}
+
 std::string mapping_text(const MappingRecord& m) {
   const VoxelCounts& v = m.voxels;
   const auto total = static_cast<double>(std::max<std::size_t>(1, v.unknown + v.free + v.occupied));
@@ -23,7 +29,9 @@ std::string mapping_text(const MappingRecord& m) {
 
 std::string done_text(const RunRecord& record) {
   std::string text;
-  if (record.hand_eye) text = calibration_text(*record.hand_eye);
+  if (record.hand_eye) {
+    text = record.verified ? verified_text(*record.hand_eye, *record.verified) : calibration_text(*record.hand_eye);
+  }
   if (record.mapping) text += (text.empty() ? "" : "; ") + mapping_text(*record.mapping);
   return text.empty() ? "nothing was asked for" : text;
 }

@@ -46,6 +46,8 @@ json only_validated(const HandEyeResult& result, json value) {
 
 json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, std::string_view solver) {
   json object = transform_json(result.flange_T_camera.pose());
+  object["source"] = "solved";
+  object["verification"] = nullptr;
   object["parent_link"] = parent_link;
   object["sigma_translation_mm"] = array_of(Eigen::Vector3d(result.sigma_translation_m * 1e3));
   object["sigma_rotation_mrad"] = array_of(Eigen::Vector3d(result.sigma_rotation_rad * 1e3));
@@ -72,6 +74,33 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
   residual["consecutive"] = residual_json(result.ax_xb_consecutive);
   object["ax_xb_residual"] = residual;
   return object;
+}
+
+void describe_stored(const VerifiedCalibration& verified, json& hand_eye) {
+  hand_eye["source"] = "stored";
+  hand_eye["views_given"] = verified.calibration.views_given;
+  hand_eye["solver"] = verified.calibration.solver;
+  for (const char* key : {"closed_form", "subset_spread", "ax_xb_residual"}) hand_eye[key] = nullptr;
+  if (!verified.verification) {
+    hand_eye["verification"] = {{"looks", verified.looks}, {"views", 0}};
+    return;
+  }
+  const Verification& v = *verified.verification;
+  json residuals = json::array();
+  for (const VerifiedView& view : v.views) {
+    residuals.push_back({{"rms_px", view.residual_rms_px},
+                         {"board_shift_mm", view.board_shift_m * 1e3},
+                         {"board_turn_mrad", view.board_turn_rad * 1e3}});
+  }
+  hand_eye["verification"] = {{"looks", verified.looks},
+                              {"views", v.views.size()},
+                              {"chi2", v.chi2},
+                              {"chi2_limit", v.chi2_limit},
+                              {"degrees_of_freedom", v.degrees_of_freedom},
+                              {"corner_sigma_px", v.corner_sigma_px},
+                              {"detectable_translation_mm", v.detectable.translation_m * 1e3},
+                              {"detectable_rotation_mrad", v.detectable.rotation_rad * 1e3},
+                              {"residuals", residuals}};
 }
 
 }  // namespace firstlook

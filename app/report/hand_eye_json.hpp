@@ -5,14 +5,19 @@
 #include <string_view>
 
 #include "algorithms/calibration/verdict.hpp"
+#include "app/report/run_record.hpp"
 
 namespace firstlook {
 
-/// The contract's keys and, beside them, solver, closed_form, arm_sigma, corner_sigma_px, subset_spread,
+/// The contract's keys and, beside them, source (solved), verification (null), solver, closed_form, arm_sigma, corner_sigma_px, subset_spread,
 /// holdout_rms_mm, views_given and ax_xb_residual (rotation_rms_deg and translation_rms_mm of the board's pose in base
 /// against its mean; of AX = XB itself below all_pairs and consecutive). SI units unless the name says otherwise;
 /// numbers that do not apply (no corners) are null.
 [[nodiscard]] nlohmann::json hand_eye_json(const HandEyeResult& result, std::string_view parent_link,
                                            std::string_view solver);
+
+/// Says of a hand_eye object that it came from an earlier job (source: stored), and how its test went (verification).
+/// What only a solve of this job could tell becomes null.
+void describe_stored(const VerifiedCalibration& verified, nlohmann::json& hand_eye);
 
 }  // namespace firstlook

@@ -104,6 +104,11 @@ std::string result_json(const RunRecord& record) {
   json["decisions_hash"] = record.decisions_hash;
   json["hand_eye"] =
       record.hand_eye ? Json(hand_eye_json(*record.hand_eye, kFlangeFrame, record.solver)) : Json(nullptr);
+  if (record.hand_eye && record.verified) {
+    nlohmann::json hand_eye = json["hand_eye"];
+    describe_stored(*record.verified, hand_eye);
+    json["hand_eye"] = hand_eye;
+  }
   json["mapping"] = record.mapping ? mapping_json(*record.mapping) : Json(nullptr);
   json["safety"] = record.safety ? safety_json(*record.safety) : Json(nullptr);
   json["memory"] = record.memory ? memory_json(*record.memory) : Json(nullptr);

@@ -12,37 +12,27 @@
 namespace firstlook {
 namespace {
 
-/// hand_eye.yaml: the calibration for people and programs without ROS.
-std::string hand_eye_yaml(const HandEyeResult& result) {
-  const Eigen::Vector3d t = result.flange_T_camera.translation();
-  Eigen::Quaterniond q = result.flange_T_camera.quaternion().normalized();
-  if (q.w() < 0) q.coeffs() = -q.coeffs();
-  const Eigen::Vector3d sigma_mm = result.sigma_translation_m * 1e3;
-  const Eigen::Vector3d sigma_mrad = result.sigma_rotation_rad * 1e3;
-  const std::string holdout_px = result.holdout_rms_m > 0 ? fmt::format("{}", result.holdout_rms_px) : "null";
-  std::string covariance;
-  for (int i = 0; i < 6; ++i) {
-    covariance += i == 0 ? "\n  [" : ",\n   ";
-    for (int j = 0; j < 6; ++j) covariance += fmt::format("{}{}", j == 0 ? "" : ", ", result.covariance(i, j));
-  }
-  return fmt::format(
-      "# Pose of the camera in the flange: p_flange = R p_camera + t. Metres; quaternion x y z w.\n"
-      "verdict: {}\n"
-      "parent_frame: {}\n"
-      "child_frame: {}\n"
-      "translation_m: [{}, {}, {}]\n"
-      "quaternion_xyzw: [{}, {}, {}, {}]\n"
-      "sigma_translation_mm: [{}, {}, {}]\n"
-      "sigma_rotation_mrad: [{}, {}, {}]\n"
-      "# 6 x 6, row by row: translation m, rotation rad; left perturbation in the parent frame.\n"
-      "covariance:{}]\n"
-      "views: {}\n"
-      "reprojection_rms_px: {}\n"
-      "holdout_rms_px: {}\n"
-      "usable_distance_m: {}\n",
-      result.verdict == Verdict::kAccepted ? "accepted" : "rejected", kFlangeFrame, kCameraFrame, t.x(), t.y(), t.z(),
-      q.x(), q.y(), q.z(), q.w(), sigma_mm.x(), sigma_mm.y(), sigma_mm.z(), sigma_mrad.x(), sigma_mrad.y(),
-      sigma_mrad.z(), covariance, result.views, result.reprojection_rms_px, holdout_px, result.usable_distance_m);
+/// What hand_eye.yaml says of this run's calibration; of a stored one the same again, with the verdict of its test.
+StoredCalibration stored_form(const RunRecord& record) {
+  if (record.verified) return record.verified->calibration;
+  const HandEyeResult& h = *record.hand_eye;
+  StoredCalibration c;
+  c.accepted = h.verdict == Verdict::kAccepted;
+  c.arm_model = record.provenance.arm_model;
+  if (const auto arm = find_arm_model(c.arm_model)) c.kinematics = kinematics_checksum(*arm);
+  c.flange_T_camera = h.flange_T_camera;
+  c.covariance = h.covariance;
+  c.corner_sigma_px = h.corner_sigma_px;
+  c.arm_sigma = h.arm_sigma;
+  c.intrinsics = record.intrinsics;
+  c.camera_T_depth = record.camera_T_depth;
+  c.solver = record.solver;
+  c.views = h.views;
+  c.views_given = static_cast<int>(h.fits.size());
+  c.reprojection_rms_px = h.reprojection_rms_px;
+  c.holdout_rms_px = h.holdout_rms_m > 0 ? h.holdout_rms_px : 0;
+  c.usable_distance_m = h.usable_distance_m;
+  return c;
 }
 
 /// A rejected calibration stays readable in hand_eye.yaml, but nothing that a robot would load is made of it.
@@ -50,7 +40,7 @@ std::vector<NamedFile> files_of_calibration(const RunRecord& record) {
   std::vector<NamedFile> files;
   if (record.intrinsics.width > 0) files.push_back({"camera_info.yaml", camera_info_yaml(record.intrinsics)});
   if (!record.hand_eye) return files;
-  files.push_back({"hand_eye.yaml", hand_eye_yaml(*record.hand_eye)});
+  files.push_back({"hand_eye.yaml", hand_eye_yaml(stored_form(record))});
   if (record.hand_eye->verdict != Verdict::kAccepted) return files;
   for (NamedFile& file : ros_calibration_files(record.hand_eye->flange_T_camera)) {
     files.push_back({"ros/" + file.name, std::move(file.text)});

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "algorithms/calibration/verdict.hpp"
+#include "algorithms/calibration/verification.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 #include "algorithms/motion/clearance.hpp"
+#include "app/dataset/hand_eye_file.hpp"
 #include "app/machine/decisions.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/fault_table.hpp"
@@ -208,6 +210,13 @@ struct Provenance {
   std::string journal_hash;
 };
 
+/// A calibration of an earlier job, and what its test on this one's views of the board said.
+struct VerifiedCalibration {
+  StoredCalibration calibration;  ///< `accepted` as of the test
+  int looks = 0;                  ///< at the board, with those that did not show it
+  std::optional<Verification> verification;  ///< empty when there were too few views to test it
+};
+
 struct RunRecord {
   Outcome outcome = Outcome::kFaulted;
   std::string reason;  ///< one sentence; for `done`, too
@@ -217,8 +226,10 @@ struct RunRecord {
   std::string decisions_hash;
 
   std::optional<HandEyeResult> hand_eye;
+  std::optional<VerifiedCalibration> verified;  ///< where hand_eye came from, when not solved in this run
   std::string solver;           ///< closed form that started it
   CameraIntrinsics intrinsics;  ///< of the colour camera; width 0: unknown, no camera_info.yaml
+  Transform<Camera, Depth> camera_T_depth;
   std::vector<CalibrationViewRecord> calibration_views;
 
   std::optional<MappingRecord> mapping;

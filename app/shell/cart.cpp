@@ -283,6 +283,8 @@ RunRecord Cart::record() const {
   r.hand_eye = bench_->hand_eye();
   r.solver = config_.calibration.solver;
   r.intrinsics = devices_.color.intrinsics();
+  r.camera_T_depth = bench_->facts().camera_T_depth;
+  r.verified = bench_->verified();
   r.calibration_views = bench_->calibration_records();
   if (bench_->mapped()) {
     r.mapping = mapping_record();

@@ -30,6 +30,7 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.frames_per_view = config.calibration.frames_per_view;
   s.calibration_views_min = config.calibration.views_min;
   s.calibration_views_max = config.calibration.views_max;
+  s.verify_views = config.calibration.verify_views;
   s.explore_views_max = config.explore.views_max;
   s.frames_while_moving_hz = config.explore.frames_while_moving_hz;
   if (config.parking_rad) s.parking_rad = *config.parking_rad;

@@ -58,6 +58,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kDataMalformed,          6102, kRefusal,  "data malformed",                       "Correct the file at the place named.") \
   X(kOutputNotEmpty,         6103, kRefusal,  "output folder exists and is not empty", "Choose another folder with --out.") \
   X(kCellInvalid,            6104, kRefusal,  "the cell cannot be used",              "Correct the cell file at the place named.") \
+  X(kStoredCalibration,      6105, kRefusal,  "the stored calibration cannot be used", "Make one here with `firstlook run --only calibrate` and give its hand_eye.yaml.") \
   X(kUsage,                  6201, kRefusal,  "wrong usage",                          "See --help.")
 // clang-format on
 

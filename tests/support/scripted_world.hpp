@@ -54,6 +54,8 @@ class ScriptedWorld : public DecisionSink {
     return r;
   }();
   ValidateResult validate{.accepted = true};
+  VerificationViewResult verification_view{.found = true, .target_met = true};
+  VerifyResult verify{.accepted = true};
   IntegrateResult integrated{.used = true, .path_free = true};
   CheckBoardResult check{.seen = true, .moved = false};
   int locate_views = 4;
@@ -225,6 +227,17 @@ class ScriptedWorld : public DecisionSink {
           answer(job, r);
           break;
         }
+        case JobKind::kNextVerificationView: {
+          VerificationViewResult r = verification_view;
+          JointVector to = position_;
+          to[4] += 0.05;
+          r.path.push_back({to, 0.5, 1.0});
+          answer(job, r);
+          break;
+        }
+        case JobKind::kVerifyCalibration:
+          answer(job, verify);
+          break;
         case JobKind::kSolve:
           answer(job, solve);
           break;

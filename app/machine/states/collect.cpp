@@ -5,16 +5,10 @@ namespace firstlook::states {
 namespace {
 constexpr std::uint32_t kFailedLooksMax = 24;  // in a row: the first turns are made blindly and may lose the board
 
-bool stored_calibration(Machine& m) {
-  return m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
-}
-
 void next_view(Machine& m) {
   Progress& p = m.progress();
-  const auto enough = static_cast<std::uint32_t>(stored_calibration(m) ? m.settings().verify_views
-                                                                       : m.settings().calibration_views_max);
-  if (p.observations >= enough) {
-    m.transition(stored_calibration(m) ? StateId::kValidate : StateId::kSolve);
+  if (p.observations >= static_cast<std::uint32_t>(m.settings().calibration_views_max)) {
+    m.transition(StateId::kSolve);
     return;
   }
   m.start_job(JobKind::kNextCalibrationView, FromHere{m.arm().position_rad, p.steps++, m.now().seconds()});
@@ -23,7 +17,7 @@ void next_view(Machine& m) {
 void take(Machine& m, const CalibrationViewResult& choice) {
   Progress& p = m.progress();
   const bool enough = p.observations >= static_cast<std::uint32_t>(m.settings().calibration_views_min);
-  if (choice.target_met && enough && !stored_calibration(m)) {
+  if (choice.target_met && enough) {
     m.transition(StateId::kSolve);
   } else if (choice.found) {
     if (choice.sigma_mm > 0) {
@@ -33,7 +27,7 @@ void take(Machine& m, const CalibrationViewResult& choice) {
       m.show("calibration view {}: a small turn, to learn where the camera sits", p.observations + 1);
     }
     m.start_trip(choice.path, false);
-  } else if (enough && !stored_calibration(m)) {
+  } else if (enough) {
     m.transition(StateId::kSolve);
   } else {
     m.conclude(Outcome::kCalibrationRejected, Fault::kTooFewViews);

@@ -52,7 +52,7 @@ Handled on_locate_board(Machine& m, const MachineEvent& event) {
       p.board_view_rad = m.arm().position_rad;
       p.views = {};
       const bool stored = m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
-      m.transition(stored ? StateId::kCollect : StateId::kIdentifyLink);
+      m.transition(stored ? StateId::kVerifyCalibration : StateId::kIdentifyLink);
     } else {
       next_view(m);
     }

@@ -21,6 +21,8 @@ void enter_solve(Machine& m);
 Handled on_solve(Machine& m, const MachineEvent& event);
 void enter_validate(Machine& m);
 Handled on_validate(Machine& m, const MachineEvent& event);
+void enter_verify_calibration(Machine& m);
+Handled on_verify_calibration(Machine& m, const MachineEvent& event);
 void enter_sweep(Machine& m);
 Handled on_sweep(Machine& m, const MachineEvent& event);
 void enter_choose(Machine& m);

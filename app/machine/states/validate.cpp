@@ -12,7 +12,7 @@ Handled on_validate(Machine& m, const MachineEvent& event) {
   if (const auto result = m.result_of<ValidateResult>(JobKind::kValidate, event)) {
     if (!result->accepted) {
       m.conclude(Outcome::kCalibrationRejected, Fault::kCalibrationRejected);
-    } else if (m.settings().scope == RunScope::kCalibrate || m.settings().scope == RunScope::kVerify) {
+    } else if (m.settings().scope == RunScope::kCalibrate) {
       m.conclude(Outcome::kDone, std::nullopt);
     } else {
       m.progress().calibration_accepted = true;
