@@ -54,7 +54,10 @@ std::string wall_section(const RunRecord& record) {
   table.row({"folder", w.folder});
   return section(
       "machine", "This computer",
-      table.html() + paragraph("Everything above is the same for every run with this seed; these figures are not."));
+      table.html() +
+          paragraph(
+              "Everything above is the same for every run with this seed and configuration, whatever the number of "
+              "workers; these figures are not."));
 }
 
 }  // namespace firstlook

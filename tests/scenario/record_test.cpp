@@ -1,27 +1,23 @@
 /// What a run tells about itself: its files agree with each other, and every figure means what app/report/README.md
 /// says.
-#include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
-#include <string>
-#include <vector>
+
+#include "tests/support/job_run.hpp"
+
+namespace firstlook {
+using test::JobFolder;
+using test::Json;
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct Row {
   std::string phase;
   double time_s = 0, expected = 0, seen = 0, unknown = 0, free = 0, occupied = 0;
 };
 
-std::vector<Row> rows_of(const std::filesystem::path& csv) {
-  std::ifstream file(csv);
+std::vector<Row> rows_of(const std::string& csv) {
+  std::istringstream file(csv);
   std::vector<Row> rows;
   std::string line;
   std::getline(file, line);  // header
@@ -84,14 +80,9 @@ void check_safety(const Json& safety) {
 }  // namespace
 
 TEST_CASE("the record of a run agrees with itself", "[scenario]") {
-  const auto folder = std::filesystem::temp_directory_path() / "firstlook_record_test";
-  std::filesystem::remove_all(folder);
-  const std::string command = std::string("\"") + FIRSTLOOK_PROGRAM +
-                              "\" run --cell empty --seed 1 --sensor fast --out \"" + folder.string() +
-                              "\" 2> /dev/null";
-  REQUIRE(std::system(command.c_str()) == 0);
-  std::ifstream file(folder / "result.json");
-  const Json result = Json::parse(file);
+  const JobFolder folder;
+  REQUIRE(folder.run_job("out").exit_code == 0);
+  const Json result = folder.read_json("out/result.json");
 
   CHECK(result["outcome"] == "done");
   const std::string reason = result["reason"];
@@ -108,7 +99,7 @@ TEST_CASE("the record of a run agrees with itself", "[scenario]") {
   CHECK(phases == std::vector<std::string>{"Boot", "Ready", "LocateBoard", "IdentifyLink", "Collect", "Solve",
                                            "Validate", "Sweep", "Explore", "VerifyBoard", "Park", "Report"});
 
-  check_views(rows_of(folder / "views.csv"), result["mapping"]);
+  check_views(rows_of(folder.read("out/views.csv")), result["mapping"]);
   check_safety(result["safety"]);
   CHECK(result["hand_eye"]["holdout_rms_px"] > result["hand_eye"]["reprojection_rms_px"]);
   const Json& wall = result["wall"];
@@ -119,5 +110,6 @@ TEST_CASE("the record of a run agrees with itself", "[scenario]") {
   CHECK(wall["job_heap_peak_bytes"] > 100'000);
   CHECK(wall["boot_heap_bytes"] > 10'000'000);
   CHECK(wall["boot_heap_bytes"] < result["memory"]["budget_bytes"]);
-  std::filesystem::remove_all(folder);
 }
+
+}  // namespace firstlook
