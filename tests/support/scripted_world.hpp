@@ -54,7 +54,11 @@ class ScriptedWorld : public DecisionSink {
     return r;
   }();
   ValidateResult validate{.accepted = true};
-  VerificationViewResult verification_view{.found = true, .target_met = true};
+  VerificationViewResult verification_view = [] {
+    VerificationViewResult r;
+    r.found = r.target_met = true;
+    return r;
+  }();
   VerifyResult verify{.accepted = true};
   IntegrateResult integrated{.used = true, .path_free = true};
   CheckBoardResult check{.seen = true, .moved = false};

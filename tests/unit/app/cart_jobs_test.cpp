@@ -26,7 +26,7 @@ class Bench {
     Pose camera_T_board = Pose::Identity();
     camera_T_board.translation() = Eigen::Vector3d(0, 0, 0.7) - board_.center();
     base_T_board_ = base_T_camera * camera_T_board;
-    auto bench = Workbench::make(config_, {kStart, Transform<Camera, Depth>()}, color_, depth_, workers_);
+    auto bench = Workbench::make(config_, {kStart, Transform<Camera, Depth>(), std::nullopt}, color_, depth_, workers_);
     REQUIRE(bench);
     bench_ = std::move(*bench);
     jobs_.emplace(*bench_);
