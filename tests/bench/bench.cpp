@@ -30,6 +30,12 @@ Row row_of(std::string name, double ours, std::string unit, std::string peer, st
   return row;
 }
 
+double seconds_on(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
 std::string verdict(const Row& row) {
   if (!row.void_because.empty()) return "void: " + row.void_because;
   if (!row.peer.empty() && !row.peer_value) return "peer missing";
@@ -94,11 +100,9 @@ std::string Report::json() const {
   return array.dump(2) + "\n";
 }
 
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
+double thread_seconds() { return seconds_on(CLOCK_THREAD_CPUTIME_ID); }
+
+double process_seconds() { return seconds_on(CLOCK_PROCESS_CPUTIME_ID); }
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

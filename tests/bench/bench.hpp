@@ -74,6 +74,8 @@ class Report {
 
 /// Seconds that the calling thread has computed: other programs of a busy machine do not count.
 [[nodiscard]] double thread_seconds();
+/// The same for all threads together.
+[[nodiscard]] double process_seconds();
 /// Seconds on the wall, for what waits or uses several threads.
 [[nodiscard]] double wall_seconds();
 

@@ -1,9 +1,12 @@
 /// Monte Carlo of the hand-eye calibration: refined error over what no estimator can beat, other solvers beside it.
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <Eigen/Cholesky>
-#include <atomic>
 #include <cmath>
+#include <cstdio>
+#include <iostream>
 #include <string>
 #include <thread>
 
@@ -140,8 +143,31 @@ void run_trial(const test::Setup& s, int views_each, std::uint64_t trial, Outcom
   }
 }
 
+/// What libraries say on standard output (ViSP prints every residual) goes nowhere.
+class QuietOutput {
+ public:
+  QuietOutput() : output_(dup(STDOUT_FILENO)) {
+    std::fflush(stdout);
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    dup2(nowhere, STDOUT_FILENO);
+    close(nowhere);
+  }
+  ~QuietOutput() {
+    std::fflush(stdout);
+    std::cout.flush();
+    dup2(output_, STDOUT_FILENO);
+    close(output_);
+  }
+  QuietOutput(const QuietOutput&) = delete;
+  QuietOutput& operator=(const QuietOutput&) = delete;
+
+ private:
+  int output_;
+};
+
 /// Trials shared by two threads: errors do not depend on who is quick.
 Outcome run_trials(const test::Setup& s, int views_each, int trials) {
+  const QuietOutput quiet;
   Outcome outcomes[2];
   const auto work = [&](int which) {
     for (int trial = which; trial < trials; trial += 2) {

@@ -56,7 +56,11 @@ int main(int argc, char** argv) {
       ->check(CLI::ExistingDirectory);
   app.add_flag("--smoke", options.smoke, "one repetition of everything: seconds; times mean little");
   app.add_flag("--thorough", options.thorough, "as many trials as the goals were stated for: half an hour");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
   Report report;
   for (const Topic& topic : kTopics) {

@@ -29,7 +29,7 @@ struct Resolution {
 constexpr Resolution kResolutions[] = {
     {"5cm", 0.05, 2, 30, 30, 100, 0},
     {"2cm", 0.02, 1, 12, 30, 100, 0},
-    {"1cm", 0.01, 0, 4, 12, 80, 1e-6},
+    {"1cm", 0.01, 0, 3, 12, 80, 1e-6},
 };
 
 struct Distance {
