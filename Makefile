@@ -1,31 +1,38 @@
 # The verbs of firstlook. Each does all that it needs: packages, build, run.
 SHELL := /bin/sh
-JOBS ?= $(shell nproc)
 export JOBS
 ARGS ?=
+ONLY ?=
 .DEFAULT_GOAL := build
-.PHONY: build run test test-asan format tidy deps clean help
+.PHONY: build run test test-asan bench format tidy deps clean help
 
 help: ## this list
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 20
+	@echo 'make                   build/release/firstlook'
+	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile | expand -t 23
+	@echo 'JOBS=N                 compilers and tests at once; default: one a core, fewer on a machine with little memory'
 
-build: deps ## build/release/firstlook
+build: deps
 	@toolchain/build release firstlook
 
 run: build ## the whole job in the simulated cell; ARGS="--cell cluttered --seed 3" goes to `firstlook run`
 	@build/release/firstlook run $(ARGS)
 
-test: deps ## every test, by ctest
+test: deps ## every test, by ctest; ARGS="-R mapping" goes to ctest
 	@toolchain/build release all
-	@ctest --test-dir build/release --output-on-failure -j $(JOBS)
+	@ctest --test-dir build/release --output-on-failure --progress -j "$$(toolchain/jobs)" $(ARGS)
 
 test-asan: deps ## the same under AddressSanitizer and UndefinedBehaviorSanitizer
 	@toolchain/build asan-ubsan all
-	@ctest --test-dir build/asan-ubsan --output-on-failure -j $(JOBS)
+	@ctest --test-dir build/asan-ubsan --output-on-failure --progress -j "$$(toolchain/jobs)" $(ARGS)
+
+bench: ## figures against their peers, into build/bench.json; ONLY=calibration|map|gain|motion|views|loop
+	@toolchain/install-dependencies bench
+	@toolchain/build release firstlook_bench
+	@build/release/tests/bench/firstlook_bench --json build/bench.json $(if $(ONLY),--only $(ONLY)) $(ARGS)
 
 format: ## clang-format everything in place
 	@toolchain/install-dependencies check
-	@git ls-files '*.cpp' '*.hpp' | xargs clang-format-19 -i
+	@toolchain/format
 
 tidy: ## clang-tidy; FILES="a.cpp b.cpp" for some
 	@toolchain/install-dependencies check
