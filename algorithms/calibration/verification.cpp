@@ -142,8 +142,8 @@ void judge(const VerificationLimits& limits, Verification& result) {
         result.views.begin(), result.views.end(),
         [](const VerifiedView& a, const VerifiedView& b) { return a.board_shift_m < b.board_shift_m; });
     result.reasons.push_back(
-        fmt::format("the views put the board at different places: chi-square {:.4g} with {} degrees of freedom, "
-                    "allowed {:.3g} (one right calibration in {:.0f} exceeds it)",
+        fmt::format("the views put the board at different places: chi-square {:.1f} with {} degrees of freedom, "
+                    "allowed {:.1f} (one right calibration in {:.0f} exceeds it)",
                     result.chi2, result.degrees_of_freedom, result.chi2_limit, 1 / limits.significance));
     result.reasons.push_back(
         fmt::format("view {} sees the board {:.1f} mm and {:.1f} mrad from where all views "
