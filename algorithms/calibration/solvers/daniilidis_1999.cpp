@@ -28,7 +28,7 @@ Eigen::Matrix<double, 6, 8> equations(const Motion& m) {
 }
 
 /// The combination of the two null vectors whose halves are perpendicular and whose first half is longest: a quadratic
-/// equation in the ratio of the factors (eq. 35), solved here through the eigenvectors of its symmetric form, which
+/// equation in the ratio of the factors, solved here through the eigenvectors of its symmetric form, which
 /// needs no special cases.
 Eigen::Matrix<double, 8, 1> perpendicular_member(const Eigen::Matrix<double, 8, 2>& null_space) {
   const Eigen::Matrix<double, 4, 2> real = null_space.topRows<4>(), dual = null_space.bottomRows<4>();

@@ -41,11 +41,10 @@ Result<HandEyeSolution> solve_24(const Problem& problem, double weight) {
   const Eigen::Matrix3d raw_x = unvec(x->head<9>()), raw_y = unvec(x->tail<9>());
   if (auto status = check_near_rotation(raw_x); !status) return std::unexpected(status.error());
   if (auto status = check_near_rotation(raw_y); !status) return std::unexpected(status.error());
-  HandEyeSolution solution;
-  solution.flange_T_camera = Transform<Flange, Camera>(make_pose(nearest_rotation(raw_x), x->segment<3>(9)));
-  solution.base_T_board = Transform<Base, Board>(make_pose(nearest_rotation(raw_y), x->segment<3>(12)));
-  solution.raw_flange_T_camera = raw_matrix(raw_x, x->segment<3>(9));
-  solution.raw_base_T_board = raw_matrix(raw_y, x->segment<3>(12));
+  auto solution = solution_of_rotations(problem, nearest_rotation(raw_y), nearest_rotation(raw_x));
+  if (!solution) return solution;
+  solution->raw_flange_T_camera = raw_matrix(raw_x, x->segment<3>(9));
+  solution->raw_base_T_board = raw_matrix(raw_y, x->segment<3>(12));
   return solution;
 }
 
@@ -89,13 +88,12 @@ Result<HandEyeSolution> qr15(const Problem& problem) {
   }
   const Eigen::Matrix3d raw = unvec(x->head<9>());
   if (auto status = check_near_rotation(raw); !status) return std::unexpected(status.error());
-  HandEyeSolution solution;
   const Eigen::Matrix3d rotation = nearest_rotation(raw);
-  solution.flange_T_camera = Transform<Flange, Camera>(make_pose(rotation, x->segment<3>(9)));
-  solution.raw_flange_T_camera = raw_matrix(raw, x->segment<3>(9));
-  if (const auto board = board_rotation(problem, rotation)) {
-    solution.base_T_board = Transform<Base, Board>(make_pose(*board, x->tail<3>()));
-  }
+  const auto board = board_rotation(problem, rotation);
+  auto solution = solution_of_rotations(problem, board.value_or(Eigen::Matrix3d::Identity()), rotation);
+  if (!solution) return solution;
+  if (!board) solution->base_T_board.reset();
+  solution->raw_flange_T_camera = raw_matrix(raw, x->segment<3>(9));
   return solution;
 }
 

@@ -49,7 +49,7 @@ namespace firstlook::solvers {
 [[nodiscard]] Result<HandEyeSolution> horaud_dornaika(const Problem& problem);
 
 /// The same paper's nonlinear form: rotation and translation together minimise sum of |alpha - R beta|^2 +
-/// |(R_A - I) t - R t_B + t_A|^2 (weights 1 for m and rad, as in the paper), started from the closed form. The paper's
+/// |(R_A - I) t - R t_B + t_A|^2 (weights 1 for m and rad), started from the closed form. The paper's
 /// penalty for the length of the quaternion is not needed: steps are rotations.
 [[nodiscard]] Result<HandEyeSolution> horaud_dornaika_nonlinear(const Problem& problem);
 
@@ -64,7 +64,7 @@ namespace firstlook::solvers {
 [[nodiscard]] Result<HandEyeSolution> li_betsis_nonlinear(const Problem& problem);
 
 /// Daniilidis 1999, "Hand-eye calibration using dual quaternions": six equations of each motion in the eight numbers of
-/// a dual quaternion (eq. 31, 33); of the two dimensional null space the member of unit length whose dual part is
+/// a dual quaternion; of the two dimensional null space the member of unit length whose dual part is
 /// perpendicular. Where noise leaves no such member the nearest is taken.
 [[nodiscard]] Result<HandEyeSolution> daniilidis(const Problem& problem);
 
@@ -94,8 +94,8 @@ namespace firstlook::solvers {
 /// Ernst, Richter, Matthaus, Martens, Bruder, Schlaefer and Schweikard 2012, "Non-orthogonal tool/flange and
 /// robot/world calibration", QR24: M X N^-1 - Y = 0 with 12 free numbers in each of X and Y by QR factorisation,
 /// lengths in mm, which makes translations weigh a thousand times what they weigh in m. The matrices as solved are the
-/// raw ones of the solution; its transforms have their rotations made orthonormal. Not for motion about one point (a
-/// wrist).
+/// raw ones of the solution. Its transforms have the nearest rotations and translations solved again for these: the raw
+/// translations belong to the raw matrices' scale. Not for motion about one point (a wrist).
 [[nodiscard]] Result<HandEyeSolution> qr24(const Problem& problem);
 
 /// The same, preconditioned: lengths divided by the RMS length of all translations, so that rotations and translations
