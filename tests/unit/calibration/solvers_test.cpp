@@ -482,3 +482,33 @@ TEST_CASE("views that contradict each other give a rigid transform or an error",
   }
   CHECK(answers > 0);
 }
+
+TEST_CASE("no hand-eye rotation makes a solver lose its footing", "[calibration][solvers]") {
+  // Motions of 5 degrees about x and y only: a hand-eye rotation of 180 degrees about an axis in that plane, or about
+  // z, is where half angle tangents and differences of axes are singular.
+  const double noise_rad = 1e-6;
+  for (const SolverRow& row : solver_table()) {
+    if (!row.board_rotation) continue;
+    CAPTURE(row.name);
+    for (const Eigen::Vector3d& vector :
+         {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(std::numbers::pi, 0, 0), Eigen::Vector3d(0, 0, std::numbers::pi),
+          Eigen::Vector3d(0.7, 0, 0), Eigen::Vector3d(1.2, 1.2, 0)}) {
+      CAPTURE(vector.transpose());
+      Random random(27);
+      const Pose truth = pose_of(rotation_exp(vector), {.1, .2, .3});
+      std::vector<PosePair> pairs;
+      for (int i = 0; i < 20; ++i) {
+        const double angle = random.uniform(0, 2 * std::numbers::pi);
+        const Eigen::Vector3d turn = 5 * test::kDegree * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+        const Pose flange = pose_of(rotation_exp(turn), 0.3 * random.normal3());
+        const PosePair exact = exact_pair(flange, truth, pose_of(rotation_exp({1, 2, 0.3}), {.5, .2, 0}));
+        Vector6d noise = Vector6d::Zero();
+        noise.tail<3>() = noise_rad * random.normal3();
+        pairs.push_back({Transform<Base, Flange>(perturb(flange, noise)), exact.camera_T_board});
+      }
+      const auto solved = solve_pose_pairs(pairs, row.solver);
+      REQUIRE(solved);
+      CHECK(pose_difference(truth, solved->flange_T_camera.pose()).tail<3>().norm() < 5e-5);
+    }
+  }
+}
