@@ -1,36 +1,24 @@
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "algorithms/calibration/solvers/algebra.hpp"
 
 namespace firstlook {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-/// A second axis weaker than this is noise of the arm and the board's pose (about 1 mrad) as much as motion.
-constexpr double kSecondAxisMin_rad = 1.0 * kDegree;
-/// Beyond this the axis of a noisy rotation may come out with the other sign: such pairs are left out.
-constexpr double kAngleMax_rad = 170 * kDegree;
 
-/// Motions of flange (a) and camera (b) between two views, with their rotation vectors.
+/// Motions of flange (a) and camera (b) between two views.
 struct Motion {
   Pose a, b;
-  Eigen::Vector3d alpha, beta;
 };
 
 Motion motion_between(const PosePair& from, const PosePair& to) {
-  Motion m;
-  m.a = from.base_T_flange.pose().inverse(Eigen::Isometry) * to.base_T_flange.pose();
-  m.b = from.camera_T_board.pose() * to.camera_T_board.pose().inverse(Eigen::Isometry);
-  m.alpha = rotation_log(m.a.linear());
-  m.beta = rotation_log(m.b.linear());
-  return m;
+  return {from.base_T_flange.pose().inverse(Eigen::Isometry) * to.base_T_flange.pose(),
+          from.camera_T_board.pose() * to.camera_T_board.pose().inverse(Eigen::Isometry)};
 }
 
 /// Between all views and in both directions, so that the order of the views means nothing.
@@ -43,85 +31,6 @@ std::vector<Motion> all_motions(std::span<const PosePair> pairs) {
     }
   }
   return motions;
-}
-
-bool is_clear(const Motion& m) { return m.alpha.norm() <= kAngleMax_rad && m.beta.norm() <= kAngleMax_rad; }
-
-bool all_finite(const Pose& p) { return p.matrix().allFinite(); }
-
-/// alpha = R beta in the least squares sense; equal to Park and Martin's (M^T M)^(-1/2) M^T where that is a rotation.
-Eigen::Matrix3d park_martin_rotation(std::span<const Motion> motions) {
-  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
-  for (const Motion& motion : motions) {
-    if (is_clear(motion)) m += motion.alpha * motion.beta.transpose();
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-}
-
-/// Tsai and Lenz's vector 2 sin(angle / 2) axis.
-Eigen::Vector3d half_sine_vector(const Eigen::Vector3d& rotation_vector) {
-  const double angle = rotation_vector.norm();
-  return angle < 1e-12 ? rotation_vector : Eigen::Vector3d(rotation_vector * (2 * std::sin(angle / 2) / angle));
-}
-
-/// Tsai and Lenz, eq. 12, as normal equations for P' = tan(angle / 2) axis of the rotation that takes camera motions to
-/// flange motions.
-struct TsaiLenzEquations {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-};
-
-/// The camera's axes are first turned by `turn`.
-TsaiLenzEquations tsai_lenz_equations(std::span<const Motion> motions, const Eigen::Matrix3d& turn) {
-  TsaiLenzEquations equations;
-  for (const Motion& motion : motions) {
-    if (!is_clear(motion)) continue;
-    const Eigen::Vector3d a = half_sine_vector(motion.alpha);
-    const Eigen::Vector3d b = half_sine_vector(turn * motion.beta);
-    const Eigen::Matrix3d skew = cross_matrix(a + b);
-    equations.normal += skew.transpose() * skew;
-    equations.right += skew.transpose() * (b - a);
-  }
-  return equations;
-}
-
-/// P' grows without bound and its equations become singular when the hand-eye rotation nears 180 degrees. Of four equal
-/// problems with the camera's axes turned by 0 and by 180 degrees about x, y and z, at least one has at most 120
-/// degrees: the best conditioned is solved.
-Eigen::Matrix3d tsai_lenz_rotation(std::span<const Motion> motions) {
-  const std::array<Eigen::Vector3d, 4> turns = {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, -1, -1),
-                                                Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(-1, -1, 1)};
-  TsaiLenzEquations best;
-  double best_eigenvalue = -1;
-  Eigen::Matrix3d best_turn = Eigen::Matrix3d::Identity();
-  for (const Eigen::Vector3d& diagonal : turns) {
-    const Eigen::Matrix3d turn = diagonal.asDiagonal();
-    const TsaiLenzEquations equations = tsai_lenz_equations(motions, turn);
-    const double smallest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(equations.normal).eigenvalues()(0);
-    if (smallest > best_eigenvalue) {
-      best = equations;
-      best_eigenvalue = smallest;
-      best_turn = turn;
-    }
-  }
-  const Eigen::Vector3d p = best.normal.ldlt().solve(best.right);
-  const double tangent = p.norm();
-  const Eigen::Vector3d rotation_vector = p * (tangent < 1e-12 ? 2.0 : 2 * std::atan(tangent) / tangent);
-  return rotation_exp(rotation_vector) * best_turn;
-}
-
-/// (R_A - I) t = R t_B - t_A over all motions (Tsai and Lenz, eq. 15).
-Eigen::Vector3d translation(std::span<const Motion> motions, const Eigen::Matrix3d& rotation) {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const Motion& m : motions) {
-    const Eigen::Matrix3d lever = m.a.linear() - Eigen::Matrix3d::Identity();
-    normal += lever.transpose() * lever;
-    right += lever.transpose() * (rotation * m.b.translation() - m.a.translation());
-  }
-  return normal.ldlt().solve(right);
 }
 
 AxXbResidual residual_of(std::span<const Motion> motions, const Transform<Flange, Camera>& flange_T_camera) {
@@ -139,50 +48,21 @@ AxXbResidual residual_of(std::span<const Motion> motions, const Transform<Flange
 
 }  // namespace
 
-std::optional<Solver> find_solver(std::string_view name) {
-  for (const Solver solver : {Solver::kParkMartin, Solver::kTsaiLenz}) {
-    if (name == solver_name(solver)) return solver;
+Result<HandEyeSolution> solve_pose_pairs(std::span<const PosePair> pairs, Solver solver) {
+  const SolverRow& row = solver_row(solver);
+  const auto problem = solvers::prepare(pairs, {row.poses_min, row.board_rotation});
+  if (!problem) return std::unexpected(problem.error());
+  auto solution = row.solve(*problem);
+  if (solution && !solution->flange_T_camera.pose().matrix().allFinite()) {
+    return failure(Fault::kSolveFailed, "{} has no finite solution", row.name);
   }
-  return std::nullopt;
-}
-
-std::string_view solver_name(Solver solver) { return solver == Solver::kParkMartin ? "park-martin" : "tsai-lenz"; }
-
-MotionDiversity motion_diversity(std::span<const PosePair> pairs) {
-  MotionDiversity diversity;
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  const std::vector<Motion> motions = all_motions(pairs);
-  for (const Motion& m : motions) {
-    diversity.angle_max_rad = std::max(diversity.angle_max_rad, m.alpha.norm());
-    scatter += m.alpha * m.alpha.transpose() / static_cast<double>(motions.size());
-  }
-  const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
-  diversity.second_axis_rad = std::sqrt(std::max(0.0, spread(1)));
-  const double first_axis_rad = std::sqrt(std::max(0.0, spread(2)));
-  diversity.axes = diversity.second_axis_rad >= kSecondAxisMin_rad ? 2 : first_axis_rad >= kSecondAxisMin_rad ? 1 : 0;
-  return diversity;
+  return solution;
 }
 
 Result<Transform<Flange, Camera>> solve_closed_form(std::span<const PosePair> pairs, Solver solver) {
-  for (const PosePair& pair : pairs) {
-    if (!all_finite(pair.base_T_flange.pose()) || !all_finite(pair.camera_T_board.pose())) {
-      return failure(Fault::kSolveFailed, "a pose is not finite");
-    }
-  }
-  if (pairs.size() < 3) return failure(Fault::kTooFewViews, "{} views, 3 are the least", pairs.size());
-  const MotionDiversity diversity = motion_diversity(pairs);
-  if (diversity.axes < 2) {
-    return failure(Fault::kDegenerateMotion,
-                   "{} views turn about {} axis only: largest rotation {:.1f} deg, about a second axis {:.2f} deg RMS",
-                   pairs.size(), diversity.axes == 0 ? "no" : "one", diversity.angle_max_rad / kDegree,
-                   diversity.second_axis_rad / kDegree);
-  }
-  const std::vector<Motion> motions = all_motions(pairs);
-  Pose result = Pose::Identity();
-  result.linear() = solver == Solver::kTsaiLenz ? tsai_lenz_rotation(motions) : park_martin_rotation(motions);
-  result.translation() = translation(motions, result.linear());
-  if (!all_finite(result)) return failure(Fault::kSolveFailed, "the closed form has no finite solution");
-  return Transform<Flange, Camera>(result);
+  const auto solution = solve_pose_pairs(pairs, solver);
+  if (!solution) return std::unexpected(solution.error());
+  return solution->flange_T_camera;
 }
 
 Transform<Base, Board> mean_board_pose(std::span<const PosePair> pairs,
@@ -194,10 +74,8 @@ Transform<Base, Board> mean_board_pose(std::span<const PosePair> pairs,
     sum += board.linear();
     position += board.translation() / static_cast<double>(pairs.size());
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
   Pose mean = Pose::Identity();
-  mean.linear() = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  mean.linear() = solvers::nearest_rotation(sum);
   mean.translation() = position;
   return Transform<Base, Board>(mean);
 }

@@ -241,12 +241,13 @@ double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board, 
 Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
                                      std::span<const CalibrationView> views, const HandEyeOptions& options) {
   const UsedViews seen = select_views(camera, board, views, {});
-  const auto start = robust_closed_form(seen.pairs, options.solver, options.refinement.view_gate);
+  const auto start = solve_pose_pairs_robust(seen.pairs, options.solver, options.refinement.view_gate);
   if (!start) return std::unexpected(start.error());
-  const auto refinement = refine_hand_eye(camera, board, views, *start, options.refinement);
+  const auto refinement = refine_hand_eye(camera, board, views, start->flange_T_camera, options.refinement);
   if (!refinement) return std::unexpected(refinement.error());
   HandEyeResult result = start_result(*refinement, select_views(camera, board, views, refinement->views).pairs);
-  result.closed_form = *start;
+  result.closed_form = start->flange_T_camera;
+  result.closed_form_raw = start->raw_flange_T_camera;
   return result;
 }
 
@@ -279,16 +280,17 @@ Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const B
 }
 
 Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pairs, const HandEyeOptions& options) {
-  const auto start = robust_closed_form(pairs, options.solver, options.refinement.view_gate);
+  const auto start = solve_pose_pairs_robust(pairs, options.solver, options.refinement.view_gate);
   if (!start) return std::unexpected(start.error());
-  const auto refinement = refine_from_pairs(pairs, *start, options.refinement);
+  const auto refinement = refine_from_pairs(pairs, start->flange_T_camera, options.refinement);
   if (!refinement) return std::unexpected(refinement.error());
   Validation validation;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (refinement->views[i].used) validation.pairs.push_back(pairs[i]);
   }
   HandEyeResult result = start_result(*refinement, validation.pairs);
-  result.closed_form = *start;
+  result.closed_form = start->flange_T_camera;
+  result.closed_form_raw = start->raw_flange_T_camera;
   result.from_pairs = true;
   const RefinementOptions quick = short_options(options, result);
   validation.resolve = [&](const Indices& indices) {

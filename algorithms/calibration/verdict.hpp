@@ -41,7 +41,8 @@ enum class Verdict : std::uint8_t { kAccepted, kRejected };
 /// Everything that result.json's hand_eye object says, and what the report shows beside it.
 struct HandEyeResult {
   Transform<Flange, Camera> flange_T_camera;
-  Transform<Flange, Camera> closed_form;  ///< what the chosen solver alone gave: the refinement's start
+  Transform<Flange, Camera> closed_form;      ///< what the chosen solver alone gave: the refinement's start
+  std::optional<Matrix3x4d> closed_form_raw;  ///< the same before its rotation was made one, by the linear solvers
   Transform<Base, Board> base_T_board;
   Matrix6d covariance = Matrix6d::Zero();  ///< of flange_T_camera: pose_difference, m and rad, flange axes
   Matrix6d board_covariance = Matrix6d::Zero();
@@ -70,7 +71,7 @@ struct HandEyeResult {
 
 /// Closed form, refinement, hold-out, subsets, usable distance, verdict. Deterministic. About 1 s for 25 views of 54
 /// corners. A rejected calibration is a value, not an error.
-/// @return the errors of solve_closed_form and refine_hand_eye
+/// @return the errors of solve_pose_pairs and refine_hand_eye
 [[nodiscard]] Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
                                                        std::span<const CalibrationView> views,
                                                        const HandEyeOptions& options = {});

@@ -111,19 +111,20 @@ std::vector<bool> gate_views(std::span<const PosePair> pairs, const Transform<Fl
   return keep;
 }
 
-Result<Transform<Flange, Camera>> robust_closed_form(std::span<const PosePair> pairs, Solver solver, double gate) {
+Result<HandEyeSolution> solve_pose_pairs_robust(std::span<const PosePair> pairs, Solver solver, double gate) {
   constexpr double kStandsOut = 3;  // in median misfits: common enough among good views to look closer, no more
   constexpr int kTrials = 150;      // one of four wrong in each: a third of wrong views leaves 1 in 5 trials clean
-  auto plain = solve_closed_form(pairs, solver);
+  auto plain = solve_pose_pairs(pairs, solver);
   if (!plain || pairs.size() < 6) return plain;
-  const Misfits all = measure(pairs, *plain);
+  const Misfits all = measure(pairs, plain->flange_T_camera);
   if (*std::max_element(all.ratio.begin(), all.ratio.end()) <= kStandsOut) return plain;
 
   Random random(1, 2101);
-  auto best = *plain;
+  auto best = plain->flange_T_camera;
   double best_size_m = all.size_m();
   for (int trial = 0; trial < kTrials; ++trial) {
-    const auto four = solve_closed_form(random_four(pairs, random), solver);
+    // By any solver that takes every four: it only tells the good views.
+    const auto four = solve_closed_form(random_four(pairs, random), Solver::kParkMartin);
     if (!four) continue;
     const double size_m = measure(pairs, *four).size_m();
     if (size_m < best_size_m) {
@@ -131,7 +132,13 @@ Result<Transform<Flange, Camera>> robust_closed_form(std::span<const PosePair> p
       best = *four;
     }
   }
-  return solve_closed_form(kept(pairs, gate_views(pairs, best, gate)), solver);
+  return solve_pose_pairs(kept(pairs, gate_views(pairs, best, gate)), solver);
+}
+
+Result<Transform<Flange, Camera>> robust_closed_form(std::span<const PosePair> pairs, Solver solver, double gate) {
+  const auto solution = solve_pose_pairs_robust(pairs, solver, gate);
+  if (!solution) return std::unexpected(solution.error());
+  return solution->flange_T_camera;
 }
 
 }  // namespace firstlook

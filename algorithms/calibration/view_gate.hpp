@@ -25,9 +25,13 @@ namespace firstlook {
 [[nodiscard]] std::vector<bool> gate_views(std::span<const PosePair> pairs,
                                            const Transform<Flange, Camera>& flange_T_camera, double gate);
 
-/// Closed form that bears up to a third of wrong views: when one view stands out, the solve whose median misfit is
+/// Solution that bears up to a third of wrong views: when one view stands out, the solve whose median misfit is
 /// least among random fours of views (Rousseeuw 1984) tells the good ones, which are then solved together.
-/// @return the errors of solve_closed_form
+/// @return the errors of solve_pose_pairs
+[[nodiscard]] Result<HandEyeSolution> solve_pose_pairs_robust(std::span<const PosePair> pairs, Solver solver,
+                                                              double gate);
+
+/// flange_T_camera of solve_pose_pairs_robust.
 [[nodiscard]] Result<Transform<Flange, Camera>> robust_closed_form(std::span<const PosePair> pairs, Solver solver,
                                                                    double gate);
 

@@ -1,6 +1,7 @@
 #include "app/cli/calibrate_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -50,6 +51,12 @@ void print_text(const HandEyeResult& r) {
              t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   fmt::print("sigma            ({:.2f}, {:.2f}, {:.2f}) mm  ({:.2f}, {:.2f}, {:.2f}) mrad\n", st.x(), st.y(), st.z(),
              sr.x(), sr.y(), sr.z());
+  if (const auto& raw = r.closed_form_raw) {
+    for (Eigen::Index row = 0; row < 3; ++row) {
+      fmt::print("{:<16} [{:9.6f} {:9.6f} {:9.6f} {:9.6f}]\n", row == 0 ? "linear solution" : "", (*raw)(row, 0),
+                 (*raw)(row, 1), (*raw)(row, 2), (*raw)(row, 3));
+    }
+  }
   fmt::print("arm sigma        {:.2f} mm  {:.2f} mrad for each axis\n", r.arm_sigma.translation_m * 1e3,
              r.arm_sigma.rotation_rad * 1e3);
   if (!r.from_pairs) {
@@ -76,7 +83,7 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
   if (!options.solver.empty()) {
     const auto solver = find_solver(options.solver);
     if (!solver) {
-      fmt::print(stderr, "unknown solver '{}': park-martin or tsai-lenz\n", options.solver);
+      fmt::print(stderr, "unknown solver '{}'; known: {}\n", options.solver, fmt::join(solver_names(), ", "));
       return kUsageError;
     }
     hand_eye.solver = *solver;

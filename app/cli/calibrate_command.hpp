@@ -7,7 +7,7 @@ namespace firstlook {
 
 struct CalibrateCommandOptions {
   std::string dataset;  ///< folder
-  std::string solver;   ///< empty: park-martin
+  std::string solver;   ///< a name of solver_table(); empty: park-martin
   bool strict = false;  ///< a rejected calibration is an error
   bool json = false;
 };

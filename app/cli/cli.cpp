@@ -1,7 +1,10 @@
 #include "app/cli/cli.hpp"
 
+#include <fmt/ranges.h>
+
 #include <CLI/CLI.hpp>
 
+#include "algorithms/calibration/solvers/solver_table.hpp"
 #include "app/shell/job_settings.hpp"
 
 namespace firstlook {
@@ -64,8 +67,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   CLI::App* calibrate_app = app.add_subcommand("calibrate", "hand-eye calibration from recorded data");
   calibrate_app->add_option("--dataset", calibrate.dataset, "folder with board.yaml and poses.csv or pairs.csv")
       ->required();
-  calibrate_app->add_option("--solver", calibrate.solver,
-                            "closed form that starts the refinement: park-martin, tsai-lenz");
+  calibrate_app->add_option(
+      "--solver", calibrate.solver,
+      fmt::format("what starts the refinement (park-martin): {}", fmt::join(solver_names(), ", ")));
   calibrate_app->add_flag("--strict", calibrate.strict, "exit with 5 when the calibration is rejected");
   calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");
 

@@ -63,7 +63,7 @@ struct Config {
   } board;
 
   struct Calibration {
-    std::string solver = "park-martin";  ///< closed form that starts the joint refinement
+    std::string solver = "park-martin";  ///< what starts the joint refinement
     int views_min = 8;
     int views_max = 30;
     int holdout_views = 4;

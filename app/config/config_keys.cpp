@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "algorithms/calibration/solvers/solver_table.hpp"
 #include "platform/loop/worker_pool.hpp"
 
 namespace firstlook {
@@ -10,7 +11,6 @@ namespace {
 constexpr std::string_view kStartSources[] = {"pendant", "panel"};
 constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"};
 constexpr std::string_view kBoardTypes[] = {"checkerboard"};
-constexpr std::string_view kSolvers[] = {"park-martin", "tsai-lenz"};
 constexpr std::string_view kHoles[] = {"ignore"};
 
 /// Every seed that a double of result.json's readers can hold exactly.
@@ -86,7 +86,7 @@ void add_calibration_keys(Keys& keys, Config& c) {
   keys.push_back({"board.inner_rows", &c.board.inner_rows, 3, 30, {}, "inner corners along a column"});
   keys.push_back(
       {"board.square_size_m", &c.board.square_size_m, 0.002, 0.5, {}, "side of one square: measure the print"});
-  keys.push_back({"calibration.solver", &k.solver, 0, 0, kSolvers, "closed form that starts the joint refinement"});
+  keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
   keys.push_back({"calibration.views_min", &k.views_min, 3, 60, {}, "views of the board to take at least"});
   keys.push_back({"calibration.views_max", &k.views_max, 3, 60, {}, "and at most"});
   keys.push_back({"calibration.holdout_views", &k.holdout_views, 0, 20, {}, "views kept out of the solve, to test it"});

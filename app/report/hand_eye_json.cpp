@@ -42,6 +42,15 @@ json only_validated(const HandEyeResult& result, json value) {
   return result.holdout_rms_m > 0 ? std::move(value) : json(nullptr);
 }
 
+json rows_or_null(const std::optional<Matrix3x4d>& matrix) {
+  if (!matrix) return nullptr;
+  json rows = json::array();
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    rows.push_back({(*matrix)(row, 0), (*matrix)(row, 1), (*matrix)(row, 2), (*matrix)(row, 3)});
+  }
+  return rows;
+}
+
 }  // namespace
 
 json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, std::string_view solver) {
@@ -63,6 +72,7 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
   object["reasons"] = result.reasons;
   object["solver"] = solver;
   object["closed_form"] = transform_json(result.closed_form.pose());
+  object["closed_form_matrix"] = rows_or_null(result.closed_form_raw);
   object["corner_sigma_px"] = only_with_corners(result, result.corner_sigma_px);
   object["arm_sigma"] = {{"translation_mm", result.arm_sigma.translation_m * 1e3},
                          {"rotation_mrad", result.arm_sigma.rotation_rad * 1e3}};
