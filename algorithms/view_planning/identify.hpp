@@ -12,10 +12,10 @@ struct IdentifyOptions {
   double other_joints_rad = 0.09;  ///< 5 degrees: they sweep the view, and the board should stay in it
 };
 
-/// One configuration for each joint, the outermost first, that differs from `at` in that joint alone: by the size
-/// above, or half of it, with the sign that leaves more margin. Straight moves there and back are certified; a joint
-/// that cannot be moved is left out. Errors: kStartBlocked when `at` is not free, kNothingReachable when no joint can
-/// be moved.
+/// Up to two configurations for each joint, the outermost first, that differ from `at` in that joint alone: by the size
+/// above, or half of it, to either side, the one with more margin first. A board at the picture's edge leaves the view
+/// on one of them. Straight moves there and back are certified; a joint that cannot be moved is left out. Errors:
+/// kStartBlocked when `at` is not free, kNothingReachable when no joint can be moved.
 [[nodiscard]] Result<Turns> identify_motions(const ArmModel& arm, const Body& body, const FreeSpace& space,
                                              const Clearance& clearance, const JointVector& at,
                                              const IdentifyOptions& options = {});

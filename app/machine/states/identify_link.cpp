@@ -15,14 +15,19 @@ int moved_joint(const JointVector& from, const JointVector& to) {
   return joint;
 }
 
+int motion_joint(Machine& m) {
+  return moved_joint(m.progress().board_view_rad, m.progress().views.views_rad[m.progress().view]);
+}
+
 void next_motion(Machine& m) {
   Progress& p = m.progress();
   if (p.view >= p.views.views_rad.size()) {
-    m.conclude(Outcome::kCalibrationRejected, Fault::kCameraNotOnArm);
+    // Without a picture that stood still nothing says that the camera is not on the arm: the board was lost each time.
+    m.conclude(Outcome::kCalibrationRejected, p.still_images > 0 ? Fault::kCameraNotOnArm : Fault::kBoardNotFound);
     return;
   }
   const JointVector& target = p.views.views_rad[p.view];
-  m.show("identifying the camera's link, joint {}", moved_joint(p.board_view_rad, target) + 1);
+  m.show("identifying the camera's link, joint {}", motion_joint(m) + 1);
   plan_to(m, target, MotionPhase::kBeforeCalibration);
 }
 
@@ -58,8 +63,13 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
         m.conclude(Outcome::kCalibrationRejected, Fault::kCameraOnInnerLink);
       }
     } else {
-      if (seen->found) ++p.still_images;
+      // Each joint is turned to both sides at most: to the other one only when the board left the view on the first.
+      const int joint = motion_joint(m);
       ++p.view;
+      if (seen->found) {
+        ++p.still_images;
+        while (p.view < p.views.views_rad.size() && motion_joint(m) == joint) ++p.view;
+      }
       next_motion(m);
     }
   }

@@ -74,6 +74,23 @@ TEST_CASE("a camera that no joint moves is reported", "[machine]") {
   CHECK(world.ending.fault == Fault::kCameraNotOnArm);
 }
 
+TEST_CASE("a board that every test motion loses says nothing about the camera's link", "[machine]") {
+  ScriptedWorld world;
+  int motions = 0;
+  world.detect = [&motions](const DetectArguments& a) {
+    DetectResult r;
+    r.found = a.purpose != BoardLook::kIdentify;
+    motions += r.found ? 0 : 1;
+    return r;
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(motions == 6);
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+  CHECK(world.ending.fault == Fault::kBoardNotFound);
+}
+
 TEST_CASE("a rejected calibration maps nothing", "[machine]") {
   ScriptedWorld world;
   world.validate.accepted = false;

@@ -17,18 +17,24 @@ TEST_CASE("each joint is moved alone, the outermost first", "[identify]") {
   const JointVector at = default_start(kUr5);
   const auto motions = identify_motions(kUr5, kBody, space, kClearance, at);
   REQUIRE(motions);
-  REQUIRE(motions->size() == 6);
-  for (int i = 0; i < 6; ++i) {
-    const JointVector change = (*motions)[static_cast<std::size_t>(i)] - at;
+  REQUIRE(motions->size() == 12);
+  for (int i = 0; i < 12; ++i) {
+    const JointVector& motion = (*motions)[static_cast<std::size_t>(i)];
+    const JointVector change = motion - at;
     for (int j = 0; j < 6; ++j) {
-      if (j == 5 - i) {
+      if (j == 5 - i / 2) {
         REQUIRE(std::abs(change[j]) >= 0.045);
-        REQUIRE(std::abs(change[j]) <= 0.14);
+        REQUIRE(std::abs(change[j]) <= 0.14 + 1e-9);
+        if (i % 2 == 1) REQUIRE(change[j] == Approx(at[j] - (*motions)[static_cast<std::size_t>(i - 1)][j]));
       } else {
         REQUIRE(change[j] == 0);
       }
     }
-    REQUIRE(certify(kUr5, kBody, space, kClearance, at, (*motions)[static_cast<std::size_t>(i)]).certified());
+    REQUIRE(certify(kUr5, kBody, space, kClearance, at, motion).certified());
+    if (i % 2 == 0) continue;
+    const double margin_m = configuration_margin(kUr5, kBody, space, kClearance, motion);
+    const JointVector& before = (*motions)[static_cast<std::size_t>(i - 1)];
+    REQUIRE(configuration_margin(kUr5, kBody, space, kClearance, before) >= margin_m - 1e-9);
   }
 }
 
