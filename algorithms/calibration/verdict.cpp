@@ -113,8 +113,8 @@ struct Figure {
 
 void reject_above(const Figure& f, std::vector<std::string>& reasons) {
   if (f.value <= f.limit) return;
-  reasons.push_back(fmt::format("{} {:.3g} {}, allowed {:.3g} {}", f.text, f.value * f.to_text, f.unit,
-                                f.limit * f.to_text, f.unit));
+  reasons.push_back(
+      fmt::format("{} {:.3g} {}, allowed {:.3g} {}", f.text, f.value * f.to_text, f.unit, f.limit * f.to_text, f.unit));
 }
 
 void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, HandEyeResult& result) {
@@ -131,13 +131,12 @@ void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, H
     reasons.emplace_back("too few views to hold any out");
   } else {
     reject_above({result.holdout_rms_px, limits.holdout_rms_max_px, 1, "held-out views miss by RMS", "px"}, reasons);
-    reject_above(
-        {result.holdout_rms_m, limits.holdout_rms_max_m, 1e3, "held-out views see the board off by RMS", "mm"},
-        reasons);
+    reject_above({result.holdout_rms_m, limits.holdout_rms_max_m, 1e3, "held-out views see the board off by RMS", "mm"},
+                 reasons);
   }
-  reject_above({result.subset_spread_m, limits.subset_spread_max_m, 1e3,
-                "solves on subsets of the views spread by RMS", "mm"},
-               reasons);
+  reject_above(
+      {result.subset_spread_m, limits.subset_spread_max_m, 1e3, "solves on subsets of the views spread by RMS", "mm"},
+      reasons);
   if (2 * failed_subsets > subset_solves) {
     reasons.push_back(fmt::format("{} of {} solves on subsets of the views failed", failed_subsets, subset_solves));
   }
@@ -214,9 +213,9 @@ double squared_error_px(const CameraIntrinsics& camera, const BoardSpec& board, 
 
 std::vector<std::string> covariance_reasons(const VerdictLimits& limits, const HandEyeResult& result) {
   std::vector<std::string> reasons;
-  reject_above({result.sigma_translation_m.maxCoeff(), limits.sigma_translation_max_m, 1e3, "sigma of translation",
-                "mm"},
-               reasons);
+  reject_above(
+      {result.sigma_translation_m.maxCoeff(), limits.sigma_translation_max_m, 1e3, "sigma of translation", "mm"},
+      reasons);
   reject_above({result.sigma_rotation_rad.maxCoeff(), limits.sigma_rotation_max_rad, 1e3, "sigma of rotation", "mrad"},
                reasons);
   reject_above({3 * point_sigma(result.flange_T_camera, result.covariance, limits.mapping_distance_m),

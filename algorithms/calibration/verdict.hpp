@@ -86,8 +86,8 @@ struct HandEyeResult {
 void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result);
 
-/// Which limits the covariance of a calibration exceeds by itself (sigmas, mapping distance, usable distance), each with
-/// its figure; empty when none. Part of the verdict, and all of it that holds for a calibration from elsewhere.
+/// Which limits the covariance of a calibration exceeds by itself (sigmas, mapping distance, usable distance), each
+/// with its figure; empty when none. Part of the verdict, and all of it that holds for a calibration from elsewhere.
 [[nodiscard]] std::vector<std::string> covariance_reasons(const VerdictLimits& limits, const HandEyeResult& result);
 
 /// Reprojection RMS (px, each coordinate) of views that took no part in the solve, the arm's pose taken as said.

@@ -38,9 +38,9 @@ struct CalibrationViewOptions {
   double tilt_max_rad = 0.785;                      ///< of aimed poses: 45 degrees
   double different_min_rad = kSharedDeviation_rad;  ///< joint distance to every view taken
   DesignCriterion criterion = DesignCriterion::kCost;
-  double cost_lever_m = 1.0;                        ///< design_cost: rotation counts as displacement at this distance
-  double cost_drop_min = 0.005;                     ///< a view must lower the cost by this share
-  int plans_max = 12;                               ///< best candidates that the planner may try
+  double cost_lever_m = 1.0;     ///< design_cost: rotation counts as displacement at this distance
+  double cost_drop_min = 0.005;  ///< a view must lower the cost by this share
+  int plans_max = 12;            ///< best candidates that the planner may try
   int plan_iterations_max = 600;
   SpeedLimits speed;  ///< for the path's duration
 };

@@ -49,7 +49,8 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   run_flags.add_to(*run_app);
   run_app->add_option("--only", only, "a part of the job; map and verify test a stored calibration first")
       ->check(CLI::IsMember({"everything", "calibrate", "map", "verify"}));
-  run_app->add_option("--calibration", calibration, "hand_eye.yaml of an earlier run, for --only map and --only verify");
+  run_app->add_option("--calibration", calibration,
+                      "hand_eye.yaml of an earlier run, for --only map and --only verify");
   run_app->add_option("--views", views, "how the views for the map are chosen: firstlook is all there is")
       ->check([](const std::string& name) {
         return name == "firstlook" ? std::string()

@@ -72,7 +72,8 @@ struct Config {
     double settle_time_s = 0.4;  ///< flange ring-down below 0.1 mm
     int frames_per_view = 3;
     double corner_sigma_px = 0.10;  ///< used to predict, and as what is expected of it; the solve estimates its own
-    double robot_sigma_mm = 0.10;   ///< repeatability of the arm, each axis; used to predict, and as what is expected of it
+    double robot_sigma_mm =
+        0.10;  ///< repeatability of the arm, each axis; used to predict, and as what is expected of it
     double robot_sigma_mrad = 0.20;
     double sigma_max_mm = 1.0;  ///< from here on the limits of the verdict
     double sigma_max_mrad = 2.0;

@@ -106,15 +106,31 @@ class Section {
 };
 
 constexpr std::array<std::string_view, 22> kKeys = {
-    "format",         "verdict",           "arm_model",       "kinematics",           "parent_frame",
-    "child_frame",    "translation_m",     "quaternion_xyzw", "sigma_translation_mm", "sigma_rotation_mrad",
-    "covariance",     "corner_sigma_px",   "arm_sigma_mm",    "arm_sigma_mrad",       "intrinsics",
-    "camera_T_depth", "solver",            "views",           "views_given",          "reprojection_rms_px",
-    "holdout_rms_px", "usable_distance_m",
+    "format",
+    "verdict",
+    "arm_model",
+    "kinematics",
+    "parent_frame",
+    "child_frame",
+    "translation_m",
+    "quaternion_xyzw",
+    "sigma_translation_mm",
+    "sigma_rotation_mrad",
+    "covariance",
+    "corner_sigma_px",
+    "arm_sigma_mm",
+    "arm_sigma_mrad",
+    "intrinsics",
+    "camera_T_depth",
+    "solver",
+    "views",
+    "views_given",
+    "reprojection_rms_px",
+    "holdout_rms_px",
+    "usable_distance_m",
 };
-constexpr std::array<std::string_view, 11> kIntrinsicsKeys = {"image_width", "image_height", "fx_px", "fy_px",
-                                                              "cx_px",       "cy_px",        "k1",    "k2",
-                                                              "p1",          "p2",           "k3"};
+constexpr std::array<std::string_view, 11> kIntrinsicsKeys = {
+    "image_width", "image_height", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
 constexpr std::array<std::string_view, 2> kTransformKeys = {"translation_m", "quaternion_xyzw"};
 
 template <typename A, typename B>
@@ -221,7 +237,8 @@ StoredCalibration parse(const YAML::Node& root) {
   }
   StoredCalibration c;
   const std::string verdict = s.text("verdict");
-  if (verdict != "accepted" && verdict != "rejected") complain(s.child("verdict"), "verdict must be accepted or rejected");
+  if (verdict != "accepted" && verdict != "rejected")
+    complain(s.child("verdict"), "verdict must be accepted or rejected");
   c.accepted = verdict == "accepted";
   if (!c.accepted) return c;  // its figures are whatever made it be rejected
   require_word(s, "parent_frame", kFlangeFrame);
@@ -364,7 +381,8 @@ Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, 
     return failure(Fault::kStoredCalibration, "it was made with pictures of {}x{}, the camera gives {}x{}", a.width,
                    a.height, b.width, b.height);
   }
-  const double px = std::max({std::abs(a.fx - b.fx), std::abs(a.fy - b.fy), std::abs(a.cx - b.cx), std::abs(a.cy - b.cy)});
+  const double px =
+      std::max({std::abs(a.fx - b.fx), std::abs(a.fy - b.fy), std::abs(a.cx - b.cx), std::abs(a.cy - b.cy)});
   const double distortion = std::max({std::abs(a.k1 - b.k1), std::abs(a.k2 - b.k2), std::abs(a.p1 - b.p1),
                                       std::abs(a.p2 - b.p2), std::abs(a.k3 - b.k3)});
   if (!(px <= kSame_px) || !(distortion <= kSameDistortion)) {

@@ -89,12 +89,10 @@ VerificationViewResult Workbench::next_verification_view(const FromHere& here) {
   std::optional<Path> path;
   if (!observations_.empty()) {
     const HandEyeClaim stated = claim();
-    const ViewDesignModel model{color_.intrinsics(),
-                                board_,
-                                stated.flange_T_camera,
-                                mean_board_pose(pairs_of(observations_), stated.flange_T_camera),
-                                stated.corner_sigma_px,
-                                stated.arm_sigma};
+    const ViewDesignModel model{
+        color_.intrinsics(),    board_,
+        stated.flange_T_camera, mean_board_pose(pairs_of(observations_), stated.flange_T_camera),
+        stated.corner_sigma_px, stated.arm_sigma};
     Matrix12d information = prior_information();
     for (const Observation& o : observations_) information += view_information(model, o.view.base_T_flange);
     const VerificationLimits limits = limits_of(config_);

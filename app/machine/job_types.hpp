@@ -76,7 +76,8 @@ enum class MotionPhase : std::uint8_t {
   kMapping,            ///< calibrated camera, known free space of the map
 };
 
-struct NoArguments {      ///< kSolve, kValidate, kVerifyCalibration, kSummarize, kForgetKnownFree; also the last one's result
+struct NoArguments {      ///< kSolve, kValidate, kVerifyCalibration, kSummarize, kForgetKnownFree; also the last one's
+                          ///< result
   std::uint8_t none = 0;  // a value takes at least one byte
   template <typename Archive>
   void fields(Archive& a) {
@@ -202,7 +203,7 @@ struct VerificationViewResult {
   bool found = false;       ///< false: no other view of the board can be reached
   bool target_met = false;  ///< the views so far would show an error of the sizes that matter
   Route path;
-  double detectable_mm = 0;  ///< smallest errors of the hand-eye transform that the views so far would surely show
+  double detectable_mm = 0;    ///< smallest errors of the hand-eye transform that the views so far would surely show
   double detectable_mrad = 0;  ///< both 0 until there are views enough to say
   template <typename Archive>
   void fields(Archive& a) {

@@ -34,12 +34,19 @@ constexpr std::array kFromMove = {Transition{"arrived or interrupted", kLook}};
 constexpr std::array kFromLook = {Transition{"frame integrated", kChoose}};
 constexpr std::array kFromPark = {Transition{"parked", kReport}};
 constexpr std::array kFromReport = {Transition{"reported", kReady}};
-constexpr std::array kFromPaused = {
-    Transition{"resume", kLocateBoard}, Transition{"resume", kIdentifyLink}, Transition{"resume", kCollect},
-    Transition{"resume", kSolve},       Transition{"resume", kValidate},     Transition{"resume", kVerifyCalibration},
-    Transition{"resume", kSweep},       Transition{"resume", kChoose},       Transition{"resume", kVerifyBoard},
-    Transition{"resume", kPark},        Transition{"resume", kReport},       Transition{"stop", kStopped},
-    Transition{"unexpected event", kFaulted}};
+constexpr std::array kFromPaused = {Transition{"resume", kLocateBoard},
+                                    Transition{"resume", kIdentifyLink},
+                                    Transition{"resume", kCollect},
+                                    Transition{"resume", kSolve},
+                                    Transition{"resume", kValidate},
+                                    Transition{"resume", kVerifyCalibration},
+                                    Transition{"resume", kSweep},
+                                    Transition{"resume", kChoose},
+                                    Transition{"resume", kVerifyBoard},
+                                    Transition{"resume", kPark},
+                                    Transition{"resume", kReport},
+                                    Transition{"stop", kStopped},
+                                    Transition{"unexpected event", kFaulted}};
 
 constexpr std::array kRows = {
     StateRow{kBoot, kNone, "Boot", states::enter_boot, nullptr, states::on_boot, kFromBoot},

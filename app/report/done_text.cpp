@@ -13,9 +13,10 @@ std::string calibration_text(const HandEyeResult& h) {
 }
 
 std::string verified_text(const HandEyeResult& h, const VerifiedCalibration& v) {
-  return fmt::format("stored calibration ({:.2f} mm and {:.2f} mrad, 1 sigma, worst axis) holds on {} views of the board",
-                     h.sigma_translation_m.maxCoeff() * 1e3, h.sigma_rotation_rad.maxCoeff() * 1e3,
-                     v.verification ? v.verification->views.size() : 0);
+  return fmt::format(
+      "stored calibration ({:.2f} mm and {:.2f} mrad, 1 sigma, worst axis) holds on {} views of the board",
+      h.sigma_translation_m.maxCoeff() * 1e3, h.sigma_rotation_rad.maxCoeff() * 1e3,
+      v.verification ? v.verification->views.size() : 0);
 }
 
 std::string mapping_text(const MappingRecord& m) {

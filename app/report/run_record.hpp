@@ -212,8 +212,8 @@ struct Provenance {
 
 /// A calibration of an earlier job, and what its test on this one's views of the board said.
 struct VerifiedCalibration {
-  StoredCalibration calibration;  ///< `accepted` as of the test
-  int looks = 0;                  ///< at the board, with those that did not show it
+  StoredCalibration calibration;             ///< `accepted` as of the test
+  int looks = 0;                             ///< at the board, with those that did not show it
   std::optional<Verification> verification;  ///< empty when there were too few views to test it
 };
 
@@ -227,8 +227,8 @@ struct RunRecord {
 
   std::optional<HandEyeResult> hand_eye;
   std::optional<VerifiedCalibration> verified;  ///< where hand_eye came from, when not solved in this run
-  std::string solver;           ///< closed form that started it
-  CameraIntrinsics intrinsics;  ///< of the colour camera; width 0: unknown, no camera_info.yaml
+  std::string solver;                           ///< closed form that started it
+  CameraIntrinsics intrinsics;                  ///< of the colour camera; width 0: unknown, no camera_info.yaml
   Transform<Camera, Depth> camera_T_depth;
   std::vector<CalibrationViewRecord> calibration_views;
 

@@ -8,7 +8,7 @@
 
 namespace firstlook {
 
-[[nodiscard]] std::string summary_section(const RunRecord& record);  ///< verdict, key figures, time line
+[[nodiscard]] std::string summary_section(const RunRecord& record);     ///< verdict, key figures, time line
 [[nodiscard]] std::string verification_table(const RunRecord& record);  ///< in place of the quality of a solve
 [[nodiscard]] std::string hand_eye_section(const RunRecord& record);
 [[nodiscard]] std::string calibration_views_section(const RunRecord& record);

@@ -17,10 +17,10 @@ std::string verification_table(const RunRecord& record) {
                fmt::format("{} views must put the board at one place, within what covariance, arm and corners allow; "
                            "one right calibration in 1000 exceeds it",
                            v->views.size())});
-    table.row({"would have shown",
-               fmt::format("{:.2f} mm, {:.2f} mrad", v->detectable.translation_m * 1e3,
-                           v->detectable.rotation_rad * 1e3),
-               "smallest error of the calibration that these views find in 99 of 100 cases, worst direction"});
+    table.row(
+        {"would have shown",
+         fmt::format("{:.2f} mm, {:.2f} mrad", v->detectable.translation_m * 1e3, v->detectable.rotation_rad * 1e3),
+         "smallest error of the calibration that these views find in 99 of 100 cases, worst direction"});
     table.row({"reprojection error in these views", fmt::format("{:.3f} px RMS", v->residual_rms_px),
                "the arm's own error included"});
     for (std::size_t i = 0; i < v->views.size(); ++i) {

@@ -39,8 +39,25 @@ Config all_changed() {
   c.camera_envelope_radius_m = 0.15;
   c.parking_rad = JointVector{0, -1.5707963267948966, 1e-17, 0.5, -0.25, 3};
   c.board = {"checkerboard", 7, 5, 0.0251};
-  c.calibration = {"tsai-lenz", 9, 31, 5, 0.3, 0.6, 0.5, 4, 0.2, 0.4, 0.5, 1.1, 1.2, 1.3, 1.4, 0.02, 0.5,
-                   "runs/first: one/hand_eye.yaml", 4};
+  c.calibration = {"tsai-lenz",
+                   9,
+                   31,
+                   5,
+                   0.3,
+                   0.6,
+                   0.5,
+                   4,
+                   0.2,
+                   0.4,
+                   0.5,
+                   1.1,
+                   1.2,
+                   1.3,
+                   1.4,
+                   0.02,
+                   0.5,
+                   "runs/first: one/hand_eye.yaml",
+                   4};
   c.depth = {0.4, 6, 3.5, 0.003};
   c.map = {0.02, {-1, -1, 0}, {1, 1, 1}, 60, "ignore"};
   c.explore = {61, 401, 2001, 9, 3};
