@@ -101,6 +101,11 @@ class ScriptedWorld : public DecisionSink {
     while (now < end && !ended) tick();
     return ended;
   }
+  /// How many paths of this phase were asked for.
+  [[nodiscard]] int plans_for(MotionPhase phase) const {
+    const auto found = plans_.find(phase);
+    return found == plans_.end() ? 0 : found->second;
+  }
   [[nodiscard]] bool was_in(StateId state) const {
     return std::find(visited.begin(), visited.end(), state) != visited.end();
   }
@@ -211,6 +216,7 @@ class ScriptedWorld : public DecisionSink {
           answer(job, views_around(position_, 6));
           break;
         case JobKind::kPlan:
+          ++plans_[arguments_of<PlanArguments>(job).phase];
           answer(job, plan(arguments_of<PlanArguments>(job)));
           break;
         case JobKind::kCertifyPath: {
@@ -292,6 +298,7 @@ class ScriptedWorld : public DecisionSink {
   std::uint32_t segment_ = 0;
   std::uint32_t frames_ = 0;
   int ticks_ = 0;
+  std::map<MotionPhase, int> plans_;
   bool machine_refusal_ = false;
 };
 
