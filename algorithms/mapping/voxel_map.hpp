@@ -66,7 +66,7 @@ class VoxelMap {
  public:
   enum class Planes : std::uint8_t {
     kAll,
-    kLogOddsOnly,  ///< an eighth of the memory; nothing is ever known free and there is no safe zone: for offline maps
+    kLogOddsOnly,  ///< a ninth of the memory; nothing is ever known free and there is no safe zone: for offline maps
   };
   explicit VoxelMap(const GridGeometry& geometry, Planes planes = Planes::kAll);
 
@@ -84,8 +84,8 @@ class VoxelMap {
   [[nodiscard]] VoxelCounts counts() const;
 
   /// Safety rule 1: log-odds at most -22, seen free from two different poses, no hit in the latest frame that saw the
-  /// voxel, seen within `free_max_age_s` before `now_s` (a stamp in the future is refused), and seen since
-  /// forget_known_free().
+  /// voxel, seen within `free_max_age_s` before `now_s` (a stamp in the future is refused), seen since
+  /// forget_known_free(), and no octant left in which a surface was hit.
   [[nodiscard]] bool known_free(std::size_t index, double now_s, double free_max_age_s) const;
 
   /// One byte for each voxel, 1 where motion may be: known free or intact safe zone, and not blocked.
@@ -105,6 +105,14 @@ class VoxelMap {
 
   /// Safety rule 7, after a stop, long pause or restart: nothing is known free until it is seen free again.
   void forget_known_free();
+
+  /// The octants of a voxel in which a surface was hit and that no ray has crossed since, one bit each (octant_of).
+  [[nodiscard]] std::uint8_t surface_octants(std::size_t index) const {
+    return surface_octants_.empty() ? std::uint8_t{0} : surface_octants_[index];
+  }
+  void set_surface_octants(std::size_t index, std::uint8_t octants) {
+    if (!surface_octants_.empty()) surface_octants_[index] = octants;
+  }
 
   /// Applies one frame: one update for each voxel, occupied before free, none at a clamp.
   /// @param missed, hit  bit i of word i / 64 is voxel i; bit_words(geometry) words
@@ -149,6 +157,7 @@ class VoxelMap {
   GridGeometry geometry_;
   std::vector<std::int8_t> log_odds_;
   std::vector<std::uint8_t> flags_;
+  std::vector<std::uint8_t> surface_octants_;
   std::vector<std::uint16_t> first_free_pose_;  ///< index into poses_ plus 1; 0 is none
   std::vector<std::uint32_t> seen_s_;           ///< stamp of the latest frame that saw the voxel
   std::vector<SeenFrom> poses_;
