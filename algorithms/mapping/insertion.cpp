@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "algorithms/mapping/octants.hpp"
 #include "algorithms/mapping/passed_voxels.hpp"
 #include "algorithms/mapping/ray_marker.hpp"
-#include "algorithms/mapping/surface_octants.hpp"
 #include "platform/core/ensure.hpp"
 #include "platform/core/processor.hpp"
 
@@ -95,7 +95,7 @@ Result<InsertionResult> Inserter::insert(VoxelMap& map, const DepthImage& depth,
   else
     mark_by_rays(map, depth, base_T_depth, self_depth_m, result);
   result.change = map.apply(missed_, hit_, base_T_depth, stamp_s);
-  clear_passed_octants(map, missed_, hit_, image_, rays_.sensor(), base_T_depth);
+  note_crossed_octants(map, missed_, hit_, image_, rays_.sensor(), rays_.is_pinhole(), base_T_depth);
   return result;
 }
 
@@ -103,7 +103,7 @@ void Inserter::mark_hit(VoxelMap& map, std::int32_t octant) {
   if (octant < 0) return;
   const auto index = static_cast<std::size_t>(octant) >> 3;
   hit_[index >> 6] |= 1ULL << (index & 63);
-  map.set_surface_octants(index, static_cast<std::uint8_t>(map.surface_octants(index) | 1U << (octant & 7)));
+  map.note_surface(index, static_cast<unsigned>(octant) & 7U);
 }
 
 void Inserter::note_reach(int v, const RayRow& row) {

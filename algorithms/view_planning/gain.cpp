@@ -17,7 +17,7 @@ constexpr std::uint8_t kPass = 0;
 /// A voxel with a surface in it that rays have passed beside is free in the map; it still ends most rays.
 VoxelClass class_for_looking(const VoxelMap& map, std::size_t index) {
   const VoxelClass voxel = map.voxel_class(index);
-  return voxel == VoxelClass::kFree && map.surface_octants(index) != 0 ? VoxelClass::kOccupied : voxel;
+  return voxel == VoxelClass::kFree && map.holds_surface(index) ? VoxelClass::kOccupied : voxel;
 }
 
 /// Free in the map, but motion cannot use it: seen from one pose only, too long ago, or doubted by the latest frame.

@@ -1,4 +1,4 @@
-#include "algorithms/mapping/surface_octants.hpp"
+#include "algorithms/mapping/octants.hpp"
 
 #include <catch2/catch.hpp>
 #include <functional>
@@ -140,7 +140,7 @@ TEST_CASE("where a surface was taken away, looks through its place free it for m
   scene.panel_there = false;
   for (int i = 0; i < 6; ++i) frontal_looks(map, inserter, camera, scene, stamp_s);
   for_panel(map, scene, [&](std::size_t i) {
-    CHECK(map.surface_octants(i) == 0);
+    CHECK(!map.holds_surface(i));
     CHECK(map.known_free(i, stamp_s, 600));
   });
 }
@@ -160,7 +160,7 @@ TEST_CASE("speckle in free space does not block it for longer than the next look
   }
   REQUIRE(inserter.insert(map, camera.image(), pose, {}, stamp_s++));
   int speckled = 0;
-  for (std::size_t i = 0; i < map.size(); ++i) speckled += map.surface_octants(i) != 0 ? 1 : 0;
+  for (std::size_t i = 0; i < map.size(); ++i) speckled += map.holds_surface(i) ? 1 : 0;
   for (int i = 0; i < 6; ++i) frontal_looks(map, inserter, camera, scene, stamp_s);
   int left = 0;
   for_panel(map, scene, [&](std::size_t i) { left += map.known_free(i, stamp_s, 600) ? 0 : 1; });
@@ -176,10 +176,10 @@ TEST_CASE("pixels too coarse to be sure of an octant leave its surface", "[mappi
   double stamp_s = 1;
   frontal_looks(fine, inserter, camera, scene, stamp_s);
   std::size_t surfaces = 0, left = 0;
-  for (std::size_t i = 0; i < fine.size(); ++i) surfaces += fine.surface_octants(i) != 0 ? 1 : 0;
+  for (std::size_t i = 0; i < fine.size(); ++i) surfaces += fine.holds_surface(i) ? 1 : 0;
   scene.panel_there = false;
   for (int i = 0; i < 6; ++i) frontal_looks(fine, inserter, camera, scene, stamp_s);
-  for (std::size_t i = 0; i < fine.size(); ++i) left += fine.surface_octants(i) != 0 ? 1 : 0;
+  for (std::size_t i = 0; i < fine.size(); ++i) left += fine.holds_surface(i) ? 1 : 0;
   // A pixel is 7 mm wide at the panel: 4 mm from its middle to its corner.
   CHECK(surfaces > 1000);
   CHECK(left >= surfaces);
@@ -192,7 +192,7 @@ TEST_CASE("a map of log-odds alone keeps no octants", "[mapping]") {
   Inserter inserter(map.geometry(), camera.sensor);
   double stamp_s = 1;
   frontal_looks(map, inserter, camera, scene, stamp_s);
-  for_panel(map, scene, [&](std::size_t i) { CHECK(map.surface_octants(i) == 0); });
+  for_panel(map, scene, [&](std::size_t i) { CHECK(!map.holds_surface(i)); });
 }
 
 }  // namespace firstlook

@@ -1,8 +1,8 @@
-/// Where in a voxel surfaces were hit, to the eighth of a voxel, and when such a place is found empty again.
+/// The eighths of a voxel: where in it surfaces were hit, and through which parts of it anybody has looked.
 ///
-/// Log-odds alone lose a surface that fills only a part of its voxels: rays that graze it pass the rest of the voxel,
-/// end elsewhere, and after a few frames the voxel is free. Safety rule 1 therefore also asks that no octant with a hit
-/// is left which nobody has looked through since.
+/// Log-odds call a voxel free when rays pass any part of it. A surface that fills another part is then lost: rays graze
+/// a panel or the far side of a column, pass beside it, and after a few frames the voxel is free. Safety rule 1
+/// therefore also asks that rays have crossed every octant of the voxel since a surface was hit there.
 #pragma once
 
 #include <cmath>
@@ -26,12 +26,13 @@ namespace firstlook {
   return octant;
 }
 
-/// After a frame was applied: in the voxels that it passed and did not hit, forgets the surface of each octant that the
-/// ray of the pixel at its middle crosses wholly. Where pixels are too coarse for that, octants keep their surface.
+/// After a frame was applied: in the voxels that it passed and did not hit, notes each octant that the ray of the pixel
+/// at its middle crosses wholly. Where pixels are too coarse for that, octants stay as they were.
 /// @param missed, hit  the planes of VoxelMap::apply
 /// @param image        the frame's reach, of every row
-void clear_passed_octants(VoxelMap& map, std::span<const std::uint64_t> missed, std::span<const std::uint64_t> hit,
-                          const RangeImage& image, const DepthSensor& sensor,
+/// @param pinhole      the sensor's lens does not distort (DepthRays::is_pinhole)
+void note_crossed_octants(VoxelMap& map, std::span<const std::uint64_t> missed, std::span<const std::uint64_t> hit,
+                          const RangeImage& image, const DepthSensor& sensor, bool pinhole,
                           const Transform<Base, Depth>& base_T_depth);
 
 }  // namespace firstlook
