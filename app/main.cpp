@@ -8,6 +8,7 @@
 #include <string>
 #include <system_error>
 
+#include "app/config/board_config.hpp"
 #include "app/cli/cli.hpp"
 #include "app/machine/state_table.hpp"
 #include "app/report/result_json.hpp"
@@ -75,7 +76,7 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.arm.model = cell.arm_model;
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
-  config.board = {"checkerboard", cell.board_columns, cell.board_rows, cell.board_square_m};
+  config.board = board_config(cell.board);
   config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
@@ -259,6 +260,7 @@ struct Dispatch {
   int operator()(const RunCommand& c) const { return run_job(c); }
   int operator()(const CalibrateCommandOptions& c) const { return run_calibrate_command(c); }
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
+  int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

@@ -33,9 +33,8 @@ Status check_input(const CameraIntrinsics& camera, const BoardSpec& board, std::
     if (!views[i].base_T_flange.pose().matrix().allFinite()) {
       return failure(Fault::kDataMalformed, "view {}: the arm's pose is not finite", i + 1);
     }
-    if (views[i].corners_px.size() != static_cast<std::size_t>(board.corners())) {
-      return failure(Fault::kDataMalformed, "view {}: {} corners instead of {}", i + 1, views[i].corners_px.size(),
-                     board.corners());
+    if (const Status fine = check_points(board, views[i].points()); !fine) {
+      return failure(Fault::kDataMalformed, "view {}: {}", i + 1, fine.error().detail());
     }
   }
   return {};
@@ -46,7 +45,7 @@ std::vector<PreparedView> prepare(const CameraIntrinsics& camera, const BoardSpe
                                   std::span<const CalibrationView> views, const RefinementOptions& options) {
   std::vector<PreparedView> prepared;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    auto seen = estimate_board_pose_robust(camera, board, views[i].corners_px, kBoardResidualMax_px,
+    auto seen = estimate_board_pose_robust(camera, board, views[i].points(), kBoardResidualMax_px,
                                            options.corner_loss_scale, options.corner_sigma_min_px);
     if (!seen) continue;
     prepared.push_back({i,
@@ -136,7 +135,7 @@ Result<Fit> fit_views(const CameraIntrinsics& camera, const BoardSpec& board, st
   }
   std::vector<BundleView> views;
   for (const PreparedView& view : used) {
-    views.push_back({view.pair.base_T_flange.pose(), given[view.index].corners_px, view.weights});
+    views.push_back({view.pair.base_T_flange.pose(), given[view.index].points(), view.weights});
   }
   Fit fit;
   fit.state.flange_T_camera = start.pose();

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithms/calibration/calibration_view.hpp"
-#include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 
@@ -19,12 +19,6 @@ enum class CalibrationSource : std::uint8_t { kImages, kCorners, kPairs };
 struct RecordedPose {
   std::string image;
   Transform<Base, Flange> base_T_flange;
-};
-
-/// Corners of one image, all of them, row by row.
-struct RecordedCorners {
-  std::string image;
-  std::vector<Eigen::Vector2d> corners_px;
 };
 
 /// What a calibration is solved from. `views` for images and corners, `pairs` for pairs.csv.
@@ -48,6 +42,9 @@ struct CalibrationDataset {
 
 /// board.yaml alone. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);
+
+/// The text of a board.yaml.
+[[nodiscard]] std::string board_yaml(const BoardSpec& board);
 
 /// camera_info.yaml as ROS writes it. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<CameraIntrinsics> read_camera_info(const std::filesystem::path& file);

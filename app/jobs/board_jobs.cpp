@@ -5,6 +5,7 @@
 #include "algorithms/calibration/camera_on_arm.hpp"
 #include "algorithms/view_planning/identify.hpp"
 #include "algorithms/view_planning/locate.hpp"
+#include "algorithms/vision/target_detection.hpp"
 #include "app/jobs/workbench.hpp"
 
 namespace firstlook {
@@ -46,7 +47,7 @@ Result<CornerSet> Workbench::corners_of(const hal::Frame& frame) {
   const CameraIntrinsics& camera = color_.intrinsics();
   const MutableGrayImage image{gray_.items().data(), camera.width, camera.height};
   if (const Status read = color_.read(frame, image); !read) return std::unexpected(read.error());
-  return detect_checkerboard(GrayImage{image.data, image.width, image.height}, board_);
+  return detect_target(GrayImage{image.data, image.width, image.height}, board_);
 }
 
 Result<CornerSet> Workbench::averaged_corners(const DetectArguments& arguments) {
@@ -73,7 +74,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   if (arguments.purpose == BoardLook::kVerify) ++verification_looks_;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners->corners_px);
+  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
   if (!pose) return result;
   result.found = true;
   result.rms_px = pose->residual_rms_px;
@@ -93,7 +94,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     Observation o;
     o.joints_rad = last.at_rad;
     o.time_s = last.frame.stamp.seconds();
-    o.view = {forward(arm_, last.at_rad).flange(), corners->corners_px};
+    o.view = {forward(arm_, last.at_rad).flange(), corners->corners_px, corners->ids};
     o.pose = *pose;
     o.residual_rms_px = pose->residual_rms_px;
     keep_picture(observations_.size());
@@ -107,7 +108,7 @@ CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   if (!hand_eye_) return result;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners->corners_px);
+  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
   if (!pose) return result;
   result.seen = true;
   const auto base_T_flange = forward(arm_, arguments.frames.back().at_rad).flange();

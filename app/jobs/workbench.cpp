@@ -1,3 +1,4 @@
+#include "app/config/board_config.hpp"
 #include "app/jobs/workbench.hpp"
 
 #include <algorithm>
@@ -63,7 +64,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       color_(color),
       depth_(depth),
       workers_(workers),
-      board_{config.board.inner_columns, config.board.inner_rows, config.board.square_size_m},
+      board_(board_of(config.board).value_or(BoardSpec{})),  // load_config has refused what is no board
       limits_{config.arm.speed_max_m_s, config.arm.speed_max_rad_s, config.arm.acceleration_rad_s2},
       zone_cylinder_{config.safe_zone.radius_m, config.safe_zone.height_m, config.cart.top_m},
       envelope_body_(body_with_envelope(arm, config.camera_envelope_radius_m)),

@@ -11,7 +11,7 @@
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/mapping/grid_geometry.hpp"
 #include "algorithms/mapping/safe_zone.hpp"
-#include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/joint_vector.hpp"
 #include "platform/core/transform.hpp"

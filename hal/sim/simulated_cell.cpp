@@ -70,9 +70,7 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, Dept
   d.depth_range_max_m = renderer.sensor().range_max_m;
   d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
   d.camera_T_depth = scene.mount.camera_T_depth;
-  d.board_columns = scene.board.spec.inner_columns;
-  d.board_rows = scene.board.spec.inner_rows;
-  d.board_square_m = scene.board.spec.square_size_m;
+  d.board = scene.board.spec;
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;
   for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});

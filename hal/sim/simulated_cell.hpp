@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algorithms/mapping/safe_zone.hpp"
+#include "algorithms/vision/target.hpp"
 #include "hal/api/cameras.hpp"
 #include "hal/api/operator_devices.hpp"
 #include "hal/api/robot_arm.hpp"
@@ -45,9 +46,7 @@ struct CellDescription {
   double depth_range_trusted_m = 3.0;
   double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
-  int board_columns = 9;                    ///< inner corners
-  int board_rows = 6;
-  double board_square_m = 0.03;
+  BoardSpec board;
   double cart_top_m = -0.02;  ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
