@@ -36,12 +36,22 @@ double smallest_spacing_px(const Grid& g) {
   return smallest;
 }
 
-/// Largest distance of a corner from the middle of its two neighbours in a row or column, in their spacings.
-/// Perspective and lens distortion bend little over three corners; a wrong corner stands out.
-double largest_local_residual(const Grid& g) {
-  double largest = 0;
+/// How far corners lie from the middle of their two neighbours in a row or column. Perspective and lens distortion bend
+/// little over three corners, and all of a board alike; a wrong corner stands out.
+struct LocalResiduals {
+  double largest_spacings = 0;
+  double largest_px = 0;
+  double median_px = 0;
+};
+
+LocalResiduals local_residuals(const Grid& g) {
+  LocalResiduals result;
+  std::vector<double> all_px;
   const auto check = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
-    largest = std::max(largest, ((a + c) / 2 - b).norm() / std::max(1e-9, (c - a).norm() / 2));
+    const double off_px = ((a + c) / 2 - b).norm();
+    all_px.push_back(off_px);
+    result.largest_px = std::max(result.largest_px, off_px);
+    result.largest_spacings = std::max(result.largest_spacings, off_px / std::max(1e-9, (c - a).norm() / 2));
   };
   for (int row = 0; row < g.board.inner_rows; ++row) {
     for (int column = 0; column < g.board.inner_columns; ++column) {
@@ -49,7 +59,10 @@ double largest_local_residual(const Grid& g) {
       if (row > 1) check(g.at(column, row - 2), g.at(column, row - 1), g.at(column, row));
     }
   }
-  return largest;
+  const auto middle = all_px.begin() + static_cast<std::ptrdiff_t>(all_px.size() / 2);
+  std::nth_element(all_px.begin(), middle, all_px.end());
+  result.median_px = *middle;
+  return result;
 }
 
 /// The search in the picture scaled to `scale`; corners in full-size pixels.
@@ -70,10 +83,13 @@ Corners search_scaled(const cv::Mat& image, const BoardSpec& board, double scale
   return corners;
 }
 
-void refine(const cv::Mat& image, const BoardSpec& board, double window_of_spacing, Corners& corners) {
+void refine(const cv::Mat& image, const BoardSpec& board, const DetectionOptions& options, Corners& corners) {
   const double spacing = smallest_spacing_px({board, corners});
-  const int half = std::clamp(static_cast<int>(std::lround(window_of_spacing * spacing)), 2, 40);
-  refine_corners({image.data, image.cols, image.rows}, {half}, corners);
+  int half = std::clamp(static_cast<int>(std::lround(options.window_of_spacing * spacing)), 2, 40);
+  if (options.fixed_half_window_px > 0) half = options.fixed_half_window_px;
+  half = std::min(half, (std::min(image.cols, image.rows) - 6) / 2);  // OpenCV asks for a larger image
+  refine_corners({image.data, image.cols, image.rows}, {half, options.refinement_iterations, options.refinement_step_px},
+                 corners);
 }
 
 /// Board coordinates in squares -> pixels.
@@ -139,9 +155,14 @@ Result<CornerSet> check_corners(const cv::Mat& image, const BoardSpec& board, co
   if (std::abs(first_square_darkness(image, grid)) < kContrastMin) {
     return failure(Fault::kBoardNotFound, "the squares have no contrast");
   }
-  const double local = largest_local_residual(grid);
-  if (!(local <= options.local_residual_max)) {
-    return failure(Fault::kBoardNotFound, "a corner lies {:.2f} squares off its neighbours", local);
+  const LocalResiduals local = local_residuals(grid);
+  if (!(local.largest_spacings <= options.local_residual_max)) {
+    return failure(Fault::kBoardNotFound, "a corner lies {:.2f} squares off its neighbours", local.largest_spacings);
+  }
+  constexpr double kMediansMax = 12, kSlack_px = 2;  // four at most on tilted boards in a lens as the thesis's
+  if (local.largest_px > kMediansMax * local.median_px + kSlack_px) {
+    return failure(Fault::kBoardNotFound, "a corner lies {:.1f} px off its neighbours, the others {:.1f} px",
+                   local.largest_px, local.median_px);
   }
   const auto h = board_homography(board, corners);
   if (!h) return failure(Fault::kBoardNotFound, "the corners do not span a plane");
@@ -165,7 +186,7 @@ Result<CornerSet> detect(const cv::Mat& image, const BoardSpec& board, const Det
   }
   if (corners.empty())
     return failure(Fault::kBoardNotFound, "no {}x{} board seen whole", board.inner_columns, board.inner_rows);
-  refine(image, board, options.window_of_spacing, corners);
+  refine(image, board, options, corners);
   make_unique(image, board, corners);
   return check_corners(image, board, options, corners);
 }

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/dataset/calibration_dataset.hpp"
 #include "app/report/hand_eye_json.hpp"
@@ -92,7 +93,12 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
     fmt::print(stderr, "no dataset named: firstlook calibrate --dataset DIR\n");
     return kUsageError;
   }
-  const auto data = read_calibration_dataset(options.dataset);
+  const auto preset = find_detector_preset(options.detector);
+  if (!preset) {
+    fmt::print(stderr, "unknown detector '{}': {}\n", options.detector, fmt::join(detector_preset_names(), ", "));
+    return kUsageError;
+  }
+  const auto data = read_calibration_dataset(options.dataset, preset->detection);
   if (!data) return fail(data.error(), kDataError);
   narrate(*data);
   const auto result = data->source == CalibrationSource::kPairs

@@ -7,6 +7,7 @@ namespace firstlook {
 
 struct CalibrateCommandOptions {
   std::string dataset;  ///< folder
+  std::string detector = "default";
   std::string solver;   ///< a name of solver_table(); empty: park-martin
   bool strict = false;  ///< a rejected calibration is an error
   bool json = false;

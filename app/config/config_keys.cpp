@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "algorithms/calibration/solvers/solver_table.hpp"
+#include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/config/board_config.hpp"
 #include "platform/loop/worker_pool.hpp"
@@ -100,6 +101,12 @@ void add_calibration_keys(Keys& keys, Config& c) {
                   dictionary_names(),
                   "family of the markers; auto: usual for the type"});
   keys.push_back({"board.first_id", &c.board.first_id, 0, 4095, {}, "number of the first marker"});
+  keys.push_back({"board.detector",
+                  &c.board.detector,
+                  0,
+                  0,
+                  detector_preset_names(),
+                  "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
   keys.push_back({"calibration.views_min", &k.views_min, 3, 60, {}, "views of the board to take at least"});
   keys.push_back({"calibration.views_max", &k.views_max, 3, 60, {}, "and at most"});

@@ -207,7 +207,8 @@ Status add_views_from_corners(const fs::path& folder, const std::vector<Recorded
 }
 
 Status add_views_from_images(const fs::path& folder, const std::vector<RecordedPose>& poses,
-                             const std::optional<CameraIntrinsics>& camera, CalibrationDataset& data) {
+                             const std::optional<CameraIntrinsics>& camera, const DetectionOptions& detection,
+                             CalibrationDataset& data) {
   for (const RecordedPose& pose : poses) {
     const auto picture = read_gray_image(folder / pose.image);
     if (!picture) return std::unexpected(picture.error());
@@ -220,7 +221,7 @@ Status add_views_from_images(const fs::path& folder, const std::vector<RecordedP
                      picture->height, camera ? "camera_info.yaml" : "the first image", data.camera.width,
                      data.camera.height);
     }
-    const auto corners = detect_target(picture->view(), data.board);
+    const auto corners = detect_target(picture->view(), data.board, detection);
     if (!corners) {
       data.notes.push_back(fmt::format("{}: left out, {}", pose.image, corners.error().detail()));
       continue;
@@ -285,7 +286,7 @@ void settle_flips(CalibrationDataset& data) {
 
 }  // namespace
 
-Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder) {
+Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder, const DetectionOptions& detection) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) return failure(Fault::kDataMissing, "{}: no such folder", folder.string());
   if (!is_there(folder / "poses.csv") && is_there(folder / "pairs.csv")) return read_pair_dataset(folder);
@@ -305,7 +306,7 @@ Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder) {
   const bool with_corners = is_there(folder / "corners.csv");
   data.source = with_corners ? CalibrationSource::kCorners : CalibrationSource::kImages;
   const Status added = with_corners ? add_views_from_corners(folder, *poses, camera, data)
-                                    : add_views_from_images(folder, *poses, camera, data);
+                                    : add_views_from_images(folder, *poses, camera, detection, data);
   if (!added) return std::unexpected(added.error());
   if (!camera) {
     if (const Status calibrated = calibrate_camera(data); !calibrated) return std::unexpected(calibrated.error());

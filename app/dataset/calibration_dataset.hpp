@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithms/calibration/calibration_view.hpp"
-#include "algorithms/vision/target.hpp"
+#include "algorithms/vision/checkerboard.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 
@@ -38,7 +38,8 @@ struct CalibrationDataset {
 /// the board is not found are left out with a note. Quaternions within 1e-3 of unit length are normalised, others
 /// refused.
 /// @return kDataMissing or kDataMalformed, naming file and line
-[[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder);
+[[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder,
+                                                                const DetectionOptions& detection = {});
 
 /// board.yaml alone. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);

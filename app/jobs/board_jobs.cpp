@@ -5,6 +5,7 @@
 #include "algorithms/calibration/camera_on_arm.hpp"
 #include "algorithms/view_planning/identify.hpp"
 #include "algorithms/view_planning/locate.hpp"
+#include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_detection.hpp"
 #include "app/jobs/workbench.hpp"
 
@@ -47,7 +48,8 @@ Result<CornerSet> Workbench::corners_of(const hal::Frame& frame) {
   const CameraIntrinsics& camera = color_.intrinsics();
   const MutableGrayImage image{gray_.items().data(), camera.width, camera.height};
   if (const Status read = color_.read(frame, image); !read) return std::unexpected(read.error());
-  return detect_target(GrayImage{image.data, image.width, image.height}, board_);
+  const auto preset = find_detector_preset(config_.board.detector).value_or(DetectorPreset{});
+  return detect_target(GrayImage{image.data, image.width, image.height}, board_, preset.detection);
 }
 
 Result<CornerSet> Workbench::averaged_corners(const DetectArguments& arguments) {
