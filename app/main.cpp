@@ -8,8 +8,8 @@
 #include <string>
 #include <system_error>
 
-#include "app/config/board_config.hpp"
 #include "app/cli/cli.hpp"
+#include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"

@@ -100,19 +100,6 @@ std::optional<Pose> pose_from_homography(const Eigen::Matrix3d& h) {
   return pose;
 }
 
-/// The other pose of a plane that looks nearly the same: its normal mirrored at the line of sight (Schweighofer and
-/// Pinz 2006), its centre kept.
-Pose mirrored(const Pose& pose, const Eigen::Vector3d& center_in_board) {
-  const Eigen::Vector3d center = pose * center_in_board;
-  const Eigen::Vector3d sight = center.normalized();
-  const Eigen::Vector3d normal = pose.linear().col(2);
-  const Eigen::Vector3d other = 2 * normal.dot(sight) * sight - normal;
-  Pose result = Pose::Identity();
-  result.linear() = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix() * pose.linear();
-  result.translation() = center - result.linear() * center_in_board;
-  return result;
-}
-
 std::optional<Pose> start_pose(const Problem& problem) {
   std::vector<Eigen::Vector2d> plane, normalized;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
@@ -150,8 +137,8 @@ BoardPose to_board_pose(const Refined& refined, double coordinates) {
   return result;
 }
 
-std::vector<double> corner_residuals(const CameraIntrinsics& camera, const BoardSpec& board,
-                                     const SeenPoints& points, const Transform<Camera, Board>& camera_T_board) {
+std::vector<double> corner_residuals(const CameraIntrinsics& camera, const BoardSpec& board, const SeenPoints& points,
+                                     const Transform<Camera, Board>& camera_T_board) {
   constexpr double kNoImage_px = 1e9;
   std::vector<double> lengths;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -178,8 +165,19 @@ std::vector<double> huber_weights(const std::vector<double>& lengths_px, double 
 
 }  // namespace
 
-Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board,
-                                      const SeenPoints& points, double residual_max_px) {
+Pose mirrored_pose(const Pose& pose, const Eigen::Vector3d& center_in_board) {
+  const Eigen::Vector3d center = pose * center_in_board;
+  const Eigen::Vector3d sight = center.normalized();
+  const Eigen::Vector3d normal = pose.linear().col(2);
+  const Eigen::Vector3d other = 2 * normal.dot(sight) * sight - normal;
+  Pose result = Pose::Identity();
+  result.linear() = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix() * pose.linear();
+  result.translation() = center - result.linear() * center_in_board;
+  return result;
+}
+
+Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board, const SeenPoints& points,
+                                      double residual_max_px) {
   if (const Status fine = check_board(board); !fine) return std::unexpected(fine.error());
   if (!is_usable(camera)) return failure(Fault::kConfigBadValue, "camera intrinsics are not usable");
   if (const Status fine = check_points(board, points); !fine) {
@@ -190,7 +188,7 @@ Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const Boar
   const auto start = start_pose(problem);
   if (!start) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
   std::optional<Refined> best = refine(problem, *start);
-  std::optional<Refined> other = refine(problem, mirrored(best ? best->pose : *start, middle_of(problem)));
+  std::optional<Refined> other = refine(problem, mirrored_pose(best ? best->pose : *start, middle_of(problem)));
   if (other && (!best || other->normal.cost < best->normal.cost)) std::swap(best, other);
   if (!best) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
 

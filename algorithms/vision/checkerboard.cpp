@@ -65,6 +65,12 @@ LocalResiduals local_residuals(const Grid& g) {
   return result;
 }
 
+cv::Mat smoothed(const cv::Mat& image) {
+  cv::Mat result;
+  cv::GaussianBlur(image, result, cv::Size(5, 5), 1.0);
+  return result;
+}
+
 /// The search in the picture scaled to `scale`; corners in full-size pixels.
 Corners search_scaled(const cv::Mat& image, const BoardSpec& board, double scale) {
   cv::Mat scaled = image;
@@ -72,12 +78,15 @@ Corners search_scaled(const cv::Mat& image, const BoardSpec& board, double scale
   const GrayImage picture{scaled.data, scaled.cols, scaled.rows};
   // More saddle points than one in a hundred pixels are noise, not a scene.
   const int saddles_max = scaled.cols * scaled.rows / 100;
-  Corners corners;
-  for (const auto& find : {find_saddle_points_full, find_saddle_points_halved}) {
-    const SaddlePoints saddles = find(picture);
-    if (saddles.count < saddle_points_min(board.corners()) || saddles.count > saddles_max) continue;
-    corners = find_checkerboard_lattice(picture, saddles, board).corners_px;
-    if (!corners.empty()) break;
+  const auto search = [&](const SaddlePoints& saddles) -> Corners {
+    if (saddles.count < saddle_points_min(board.corners()) || saddles.count > saddles_max) return {};
+    return find_checkerboard_lattice(picture, saddles, board).corners_px;
+  };
+  Corners corners = search(find_saddle_points_full(picture));
+  if (corners.empty()) corners = search(find_saddle_points_halved(picture));
+  if (corners.empty()) {  // a small board in noise: its corners are too near for half the size
+    const cv::Mat quiet = smoothed(scaled);
+    corners = search(find_saddle_points_full({quiet.data, quiet.cols, quiet.rows}));
   }
   for (Eigen::Vector2d& p : corners) p = ((p.array() + 0.5) / scale - 0.5).matrix();
   return corners;
@@ -88,8 +97,8 @@ void refine(const cv::Mat& image, const BoardSpec& board, const DetectionOptions
   int half = std::clamp(static_cast<int>(std::lround(options.window_of_spacing * spacing)), 2, 40);
   if (options.fixed_half_window_px > 0) half = options.fixed_half_window_px;
   half = std::min(half, (std::min(image.cols, image.rows) - 6) / 2);  // OpenCV asks for a larger image
-  refine_corners({image.data, image.cols, image.rows}, {half, options.refinement_iterations, options.refinement_step_px},
-                 corners);
+  refine_corners({image.data, image.cols, image.rows},
+                 {half, options.refinement_iterations, options.refinement_step_px}, corners);
 }
 
 /// Board coordinates in squares -> pixels.
@@ -186,9 +195,15 @@ Result<CornerSet> detect(const cv::Mat& image, const BoardSpec& board, const Det
   }
   if (corners.empty())
     return failure(Fault::kBoardNotFound, "no {}x{} board seen whole", board.inner_columns, board.inner_rows);
-  refine(image, board, options, corners);
   make_unique(image, board, corners);
-  return check_corners(image, board, options, corners);
+  Corners refined = corners;
+  refine(image, board, options, refined);
+  auto result = check_corners(image, board, options, refined);
+  if (result) return result;
+  // Small windows in strong noise send a corner astray: once more in a quieter picture.
+  refined = corners;
+  refine(smoothed(image), board, options, refined);
+  return check_corners(image, board, options, refined);
 }
 
 }  // namespace

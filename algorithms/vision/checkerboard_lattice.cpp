@@ -34,7 +34,12 @@ bool colours_alternate(const SaddlePoint& a, const SaddlePoint& b) {
 class Search {
  public:
   Search(GrayImage image, const SaddlePoints& saddles, const BoardSpec& board)
-      : image_(image), saddles_(saddles.points), board_(board), points_(points_of(saddles.points)), index_(points_, kBucket_px) {
+      : image_(image),
+        saddles_(saddles.points),
+        board_(board),
+        points_(points_of(saddles.points)),
+        index_(points_, kBucket_px) {
+    for (const SaddlePoint& s : saddles_) strengths_.push_back(s.xy * s.xy - s.xx * s.yy);
     for (int row = 0; row < board.inner_rows; ++row) {
       for (int column = 0; column < board.inner_columns; ++column) places_.push_back({column, row});
     }
@@ -48,8 +53,8 @@ class Search {
       if (tried[p]) continue;
       const auto seed = seed_at(p);
       if (!seed) continue;
-      const auto grown = grow_lattice(index_, *seed, kTolerance,
-                                      [&](std::size_t a, std::size_t b) { return colours_alternate(saddles_[a], saddles_[b]); });
+      const auto alternate = [&](std::size_t a, std::size_t b) { return colours_alternate(saddles_[a], saddles_[b]); };
+      const auto grown = grow_lattice(index_, *seed, {kTolerance, alternate, strengths_});
       const int size = static_cast<int>(grown.size());
       result.largest = std::max(result.largest, size);
       // Points of a good lattice need not be tried again; those of a small one may have had a bad start.
@@ -231,6 +236,7 @@ class Search {
   const BoardSpec& board_;
   std::vector<Eigen::Vector2d> points_;
   PointIndex index_;
+  std::vector<float> strengths_;
   std::vector<LatticePlace> places_;
 };
 

@@ -134,10 +134,11 @@ std::vector<std::size_t> find_grid(const std::vector<Disc>& discs, const BoardSp
     const auto seed = seed_at(discs, p);
     if (!seed) continue;
     ++seeds;
-    const auto grown = grow_lattice(index, *seed, 0.3, [&](std::size_t a, std::size_t b) {
+    const auto alike = [&](std::size_t a, std::size_t b) {
       const double ratio = discs[b].radius_px / discs[a].radius_px;
       return ratio > 0.6 && ratio < 1.7;
-    });
+    };
+    const auto grown = grow_lattice(index, *seed, {0.3, alike, {}});
     double first_sum = 0;
     for (int turns = 0; turns < 4; ++turns) {
       const auto matches = match_lattice(grown, places, turns);

@@ -32,14 +32,16 @@ struct Node {
   std::array<Eigen::Vector2d, 2> step;  ///< along i and j here
 };
 
-std::optional<std::size_t> nearest(const PointIndex& index, const Eigen::Vector2d& at, double radius_px,
-                                   const std::vector<bool>& used) {
+std::optional<std::size_t> best_near(const PointIndex& index, const Eigen::Vector2d& at, double radius_px,
+                                     const std::vector<bool>& used, std::span<const float> strengths) {
+  constexpr double kAtTheRim = 0.3;  // how much a candidate counts there, against one in the middle
   std::optional<std::size_t> best;
-  double best2 = radius_px * radius_px;
+  double best_score = 0;
   index.near(at, radius_px, [&](std::size_t p) {
-    const double d2 = (index.points()[p] - at).squaredNorm();
-    if (used[p] || d2 > best2) return;
-    best = p, best2 = d2;
+    const double share2 = (index.points()[p] - at).squaredNorm() / (radius_px * radius_px);
+    if (used[p] || share2 > 1) return;
+    const double score = (strengths.empty() ? 1.0 : strengths[p]) * (1 - (1 - kAtTheRim) * share2);
+    if (score > best_score) best = p, best_score = score;
   });
   return best;
 }
@@ -110,8 +112,7 @@ int PointIndex::row(double y) const {
   return static_cast<int>(std::clamp((y - low_.y()) / bucket_px_, 0.0, rows_ - 1.0));
 }
 
-std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSeed& seed, double tolerance,
-                                       const std::function<bool(std::size_t, std::size_t)>& fits) {
+std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSeed& seed, const LatticeGrowth& how) {
   std::vector<bool> used(index.points().size(), false);
   Field field;
   std::vector<Node> nodes{{{0, 0, seed.point}, index.points()[seed.point], {seed.step_i, seed.step_j}}};
@@ -130,6 +131,13 @@ std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSee
       const int behind = field.at(from.place.i - di, from.place.j - dj);
       if (behind >= 0) {
         step = from.px - nodes[static_cast<std::size_t>(behind)].px;
+        // Perspective makes the steps of a row grow or shrink by nearly the same factor each time.
+        const int further = field.at(from.place.i - 2 * di, from.place.j - 2 * dj);
+        if (further >= 0) {
+          const double before =
+              (nodes[static_cast<std::size_t>(behind)].px - nodes[static_cast<std::size_t>(further)].px).norm();
+          step *= std::clamp(step.norm() / std::max(1e-9, before), 0.75, 1.33);
+        }
       } else {
         for (const int side : {1, -1}) {
           const int beside = field.at(from.place.i + side * dj, from.place.j + side * di);
@@ -139,8 +147,8 @@ std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSee
           break;
         }
       }
-      const auto found = nearest(index, from.px + step, tolerance * step.norm(), used);
-      if (!found || !fits(from.place.point, *found)) continue;
+      const auto found = best_near(index, from.px + step, how.tolerance * step.norm(), used, how.strengths);
+      if (!found || !how.fits(from.place.point, *found)) continue;
       Node next{{i, j, *found}, index.points()[*found], from.step};
       next.step[axis] = sign * (next.px - from.px);
       used[*found] = true;

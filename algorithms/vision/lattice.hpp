@@ -49,11 +49,19 @@ struct LatticeSeed {
   Eigen::Vector2d step_i, step_j;
 };
 
-/// Grows from the seed, neighbour by neighbour, each looked for where the steps before it lead (within
-/// `tolerance` of the step's length), so that perspective and lens distortion may bend the rows. `fits(a, b)` says
-/// whether point b can be a direct neighbour of a. No place is taken twice and no point used twice.
-[[nodiscard]] std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSeed& seed, double tolerance,
-                                                     const std::function<bool(std::size_t, std::size_t)>& fits);
+/// How a lattice grows.
+struct LatticeGrowth {
+  double tolerance = 0.3;  ///< how far from where it is looked for a neighbour may lie, in lengths of the step
+  /// Whether point b can be a direct neighbour of point a.
+  std::function<bool(std::size_t a, std::size_t b)> fits;
+  /// Of several candidates the stronger wins over the nearer one; empty: all are alike.
+  std::span<const float> strengths;
+};
+
+/// Grows from the seed, neighbour by neighbour, each looked for where the steps before it lead, so that perspective and
+/// lens distortion may bend the rows. No place is taken twice and no point used twice.
+[[nodiscard]] std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSeed& seed,
+                                                     const LatticeGrowth& how);
 
 /// A place of a target: integer coordinates of one of its points.
 struct LatticePlace {

@@ -49,8 +49,8 @@ constexpr std::uint64_t times(std::uint64_t a, std::uint64_t b) {
 }
 
 /// ARToolKitPlus (Wagner and Schmalstieg 2007): the BCH code of length 63 that corrects 4 errors, shortened to 36 bits;
-/// the number in the 12 highest, then the 24 check bits. Its generator has the roots a, a^3, a^5, a^7 of GF(64) with a^6
-/// = a + 1. All is inverted by a mask, so that no marker is plain.
+/// the number in the 12 highest, then the 24 check bits. Its generator has the roots a, a^3, a^5, a^7 of GF(64) with
+/// a^6 = a + 1. All is inverted by a mask, so that no marker is plain.
 std::uint64_t bch_code(int id) {
   constexpr std::uint64_t kGenerator = times(times(0x43, 0x57), times(0x67, 0x49));
   constexpr std::uint64_t kMask = 0x8f80b8750;

@@ -48,7 +48,7 @@ std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_m
 }
 
 void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
-  constexpr double kDarker = 7;  // grey levels below the mean of the window
+  constexpr double kDarker = 7;                // grey levels below the mean of the window
   constexpr std::size_t kContoursMax = 20000;  // beyond that it is noise
   cv::Mat dark;
   cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
@@ -90,7 +90,9 @@ struct Side {
   Eigen::Vector2d start, along, outward;
   Eigen::Vector3d f = Eigen::Vector3d::Zero();  ///< f(t) = f0 + f1 t + f2 t^2, t and f in pixels
 
-  [[nodiscard]] Eigen::Vector2d point(double t) const { return start + t * along + (f[0] + t * (f[1] + t * f[2])) * outward; }
+  [[nodiscard]] Eigen::Vector2d point(double t) const {
+    return start + t * along + (f[0] + t * (f[1] + t * f[2])) * outward;
+  }
   [[nodiscard]] Eigen::Vector2d tangent(double t) const { return along + (f[1] + 2 * t * f[2]) * outward; }
 };
 
@@ -99,8 +101,8 @@ struct EdgePoint {
   double rise = 0;  ///< grey levels from dark to white
 };
 
-/// Where the grey values rise most steeply across the side at t, within `reach_px` of its present curve: the centre of
-/// the squared gradients.
+/// Where the grey values rise across the side at t, within `reach_px` of its present curve: the centre of the rises.
+/// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
 std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t, double reach_px) {
   constexpr double kStep_px = 0.5;
   constexpr double kRiseMin = 8;  // grey levels, all rises together
@@ -114,8 +116,8 @@ std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t,
     const double here = gray_between(image, on_line + offset * side.outward);
     const double rise = std::max(0.0, here - before);
     rises += rise;
-    sum += rise * rise;
-    moment += rise * rise * (offset - kStep_px / 2);
+    sum += rise;
+    moment += rise * (offset - kStep_px / 2);
     before = here;
   }
   if (rises < kRiseMin) return std::nullopt;
@@ -178,10 +180,12 @@ std::optional<double> refine_side(GrayImage image, double length_px, double reac
   straight = fit_curve(points, false);
   side.f = straight.f;
   if (static_cast<int>(points.size()) < kPointsForBend) return rise;
-  // Bent only where the bend is certain: a parabola's ends are half as sure as a line's.
+  // Bent only where the bend is likely: a parabola's ends are half as sure as a line's, and a bend of 1.5 sigmas costs
+  // a line as much as that.
+  constexpr double kBendSigmas = 1.5;
   const CurveFit bent = fit_curve(points, true);
   const double sigma = std::sqrt(bent.squared / (static_cast<double>(points.size()) - 3));
-  if (std::abs(bent.f[2]) > 3 * sigma * bent.bend_sigma) side.f = bent.f;
+  if (std::abs(bent.f[2]) > kBendSigmas * sigma * bent.bend_sigma) side.f = bent.f;
   return rise;
 }
 

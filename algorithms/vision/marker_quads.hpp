@@ -20,8 +20,8 @@ using Quad = std::array<Eigen::Vector2d, 4>;
 [[nodiscard]] Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px = 10);
 
 /// Moves each side onto the edge between dark and white (subpixel edge points, a line through them, or a parabola where
-/// lens distortion bends it) and the corners to where the sides meet. `cell_px` is how far from it no other edge from dark to
-/// white (seen from inside) lies: the width of a marker's border. False when a side has no edge.
+/// lens distortion bends it) and the corners to where the sides meet. `cell_px` is how far from it no other edge from
+/// dark to white (seen from inside) lies: the width of a marker's border. False when a side has no edge.
 [[nodiscard]] bool refine_quad(GrayImage image, double cell_px, Quad& quad);
 
 /// Grey value between pixel centres, bilinear; the border's beyond the image.

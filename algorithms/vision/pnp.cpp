@@ -9,7 +9,9 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
+#include "algorithms/vision/board_pose.hpp"
 #include "algorithms/vision/camera_model.hpp"
+#include "algorithms/vision/rotation.hpp"
 
 namespace firstlook {
 namespace {
@@ -87,6 +89,28 @@ std::vector<std::size_t> outermost(const Problem& p, const std::vector<std::size
   return chosen;
 }
 
+/// OpenCV's EPnP misses a plane by pixels now and then, without any noise: refined from there and from the plane's
+/// other pose, the better one stays.
+PnpSolution polished(const Problem& p, const std::vector<std::size_t>& inliers, const PnpSolution& start) {
+  std::vector<cv::Point3d> object;
+  std::vector<cv::Point2d> image;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  for (const std::size_t i : inliers) {
+    object.push_back(p.object[i]), image.push_back(p.image[i]);
+    center += Eigen::Vector3d(p.object[i].x, p.object[i].y, 0) / static_cast<double>(inliers.size());
+  }
+  PnpSolution best = start;
+  for (const Pose& from : {start.camera_T_board.pose(), mirrored_pose(start.camera_T_board.pose(), center)}) {
+    const Eigen::Vector3d r = rotation_log(from.linear()), t = from.translation();
+    cv::Mat rotation = (cv::Mat_<double>(3, 1) << r.x(), r.y(), r.z());
+    cv::Mat translation = (cv::Mat_<double>(3, 1) << t.x(), t.y(), t.z());
+    cv::solvePnPRefineLM(object, image, p.matrix, p.distortion, rotation, translation);
+    const PnpSolution refined = solution_of(p, inliers, rotation, translation);
+    if (refined.residual_rms_px < best.residual_rms_px) best = refined;
+  }
+  return best;
+}
+
 std::vector<PnpSolution> solve(const Problem& p, const std::vector<std::size_t>& inliers, PnpMethod method) {
   const std::vector<std::size_t> used = method == PnpMethod::kP3p ? outermost(p, inliers) : inliers;
   std::vector<cv::Point3d> object;
@@ -106,9 +130,9 @@ std::vector<PnpSolution> solve(const Problem& p, const std::vector<std::size_t>&
     const bool finite = solution.camera_T_board.pose().matrix().allFinite();
     if (finite && solution.camera_T_board.translation().z() > 0) solutions.push_back(solution);
   }
-  std::stable_sort(solutions.begin(), solutions.end(), [](const PnpSolution& a, const PnpSolution& b) {
-    return a.residual_rms_px < b.residual_rms_px;
-  });
+  if (method == PnpMethod::kEpnp && !solutions.empty()) solutions = {polished(p, inliers, solutions.front())};
+  std::stable_sort(solutions.begin(), solutions.end(),
+                   [](const PnpSolution& a, const PnpSolution& b) { return a.residual_rms_px < b.residual_rms_px; });
   return solutions;
 }
 
@@ -118,7 +142,7 @@ std::vector<std::size_t> sampled_inliers(const Problem& p, const PnpOptions& opt
   const bool solved = cv::solvePnPRansac(p.object, p.image, p.matrix, p.distortion, rotation, translation, false,
                                          options.ransac->iterations,
                                          static_cast<float>(options.ransac->reprojection_max_px), 0.99, found,
-                                         flag_of(options.method));
+                                         cv::SOLVEPNP_P3P);  // samples of four; EPnP's of five are poor on a plane
   if (!solved) return {};
   std::vector<std::size_t> inliers(found.begin(), found.end());
   std::sort(inliers.begin(), inliers.end());

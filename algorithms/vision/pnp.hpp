@@ -1,4 +1,5 @@
-/// The pose of a target by the published solvers, to choose and to compare; estimate_board_pose is what calibration uses.
+/// The pose of a target by the published solvers, to choose and to compare; estimate_board_pose is what calibration
+/// uses.
 #pragma once
 
 #include <optional>
@@ -15,13 +16,14 @@ namespace firstlook {
 enum class PnpMethod : std::uint8_t {
   kIterative,  ///< Levenberg-Marquardt from a homography
   kP3p,        ///< Gao et al. 2003 on the three outermost points, a fourth and then all decide between its solutions
-  kEpnp,       ///< Lepetit, Moreno-Noguer and Fua 2009
+  kEpnp,       ///< Lepetit, Moreno-Noguer and Fua 2009, polished by Levenberg-Marquardt
   kIppe,       ///< Collins and Bartoli 2014: both poses of a plane
 };
 [[nodiscard]] std::string_view pnp_method_name(PnpMethod method);
 [[nodiscard]] std::optional<PnpMethod> find_pnp_method(std::string_view name);
 
-/// Random sampling (Fischler and Bolles 1981) before the solve; OpenCV's, with its fixed seed.
+/// Random sampling (Fischler and Bolles 1981) before the solve, by P3P on fours of points; OpenCV's,
+/// with its fixed seed.
 struct RansacOptions {
   int iterations = 100;
   double reprojection_max_px = 8;  ///< of an inlier

@@ -23,9 +23,9 @@ double side_px(const Quad& quad) {
 /// Grey values of the cells of a candidate, border included, and of the paper around it.
 struct CellGrays {
   int cells = 0;
-  std::vector<double> gray;  ///< row by row
-  double paper = 0;                   ///< mean of all sides
-  std::array<double, 4> beside{};     ///< the paper along each side
+  std::vector<double> gray;        ///< row by row
+  double paper = 0;                ///< mean of all sides
+  std::array<double, 4> beside{};  ///< the paper along each side
   [[nodiscard]] double at(int column, int row) const { return gray[static_cast<std::size_t>(row * cells + column)]; }
 };
 
@@ -69,7 +69,8 @@ bool paper_all_around(const CellGrays& cells, double border) {
 std::optional<std::uint64_t> read_code(const CellGrays& cells) {
   const int n = cells.cells;
   double border = 0;
-  for (int i = 0; i + 1 < n; ++i) border += cells.at(i, 0) + cells.at(n - 1, i) + cells.at(i + 1, n - 1) + cells.at(0, i + 1);
+  for (int i = 0; i + 1 < n; ++i)
+    border += cells.at(i, 0) + cells.at(n - 1, i) + cells.at(i + 1, n - 1) + cells.at(0, i + 1);
   border /= 4 * (n - 1);
   if (cells.paper - border < kContrastMin || !paper_all_around(cells, border)) return std::nullopt;
   const double middle = (border + cells.paper) / 2;

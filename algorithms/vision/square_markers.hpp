@@ -9,8 +9,8 @@
 namespace firstlook {
 
 struct SquareMarker {
-  int marker = 0;     ///< which of the target's, 0 to BoardSpec::markers() - 1
-  Quad corners_px;    ///< from the marker's own upper left corner, clockwise
+  int marker = 0;   ///< which of the target's, 0 to BoardSpec::markers() - 1
+  Quad corners_px;  ///< from the marker's own upper left corner, clockwise
   int wrong_cells = 0;
 };
 

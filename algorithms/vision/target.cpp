@@ -86,8 +86,7 @@ std::array<int, 2> BoardSpec::neighbours_of_outer(int corner) const {
     return {4 * marker + (k + 1) % 4, 4 * marker + (k + 3) % 4};
   }
   const int column = corner % inner_columns, row = corner / inner_columns;
-  return {row * inner_columns + (column == 0 ? 1 : column - 1),
-          (row == 0 ? 1 : row - 1) * inner_columns + column};
+  return {row * inner_columns + (column == 0 ? 1 : column - 1), (row == 0 ? 1 : row - 1) * inner_columns + column};
 }
 
 double BoardSpec::detail_ratio() const {

@@ -47,7 +47,7 @@ struct BoardSpec {
   double mark_size_m = 0;  ///< side of a marker's black square, or a circle's diameter; unused by checkerboards
   MarkerDictionary dictionary = MarkerDictionary::k4x4_50;
   int first_id = 0;     ///< of the markers, which count up row by row
-  bool legacy = false;  ///< ChArUco boards as OpenCV drew them before 4.7: with an even number of rows of squares the
+  bool legacy = false;  ///< ChArUco boards as OpenCV drew them before 4.6: with an even number of rows of squares the
                         ///< upper left square is white
 
   [[nodiscard]] bool has_marker_corners() const {
@@ -122,7 +122,7 @@ struct SeenPoints {
   // Implicit on purpose: all that holds points can be passed as it is.
   SeenPoints(std::span<const Eigen::Vector2d> px, std::span<const int> numbers = {})  // NOLINT
       : corners_px(px), ids(numbers) {}
-  SeenPoints(const std::vector<Eigen::Vector2d>& px) : corners_px(px) {}           // NOLINT
+  SeenPoints(const std::vector<Eigen::Vector2d>& px) : corners_px(px) {}          // NOLINT
   SeenPoints(const CornerSet& set) : corners_px(set.corners_px), ids(set.ids) {}  // NOLINT
   [[nodiscard]] std::size_t size() const { return corners_px.size(); }
   [[nodiscard]] int point(std::size_t i) const { return point_of(ids, i); }

@@ -12,9 +12,9 @@ namespace {
 struct Kind {
   std::string_view name;
   TargetType type;
-  bool alone = false;                                             ///< one marker
-  double mark_share = 0;                                          ///< usual size of a mark, of the spacing
-  MarkerDictionary dictionary = MarkerDictionary::k4x4_50;        ///< of "auto"
+  bool alone = false;                                       ///< one marker
+  double mark_share = 0;                                    ///< usual size of a mark, of the spacing
+  MarkerDictionary dictionary = MarkerDictionary::k4x4_50;  ///< of "auto"
 };
 
 constexpr std::array<Kind, 9> kKinds = {{
@@ -44,8 +44,8 @@ bool family_fits(const Kind& kind, MarkerDictionary d) {
 const Kind& kind_of(const BoardSpec& board) {
   const auto* const found = std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& kind) {
     const bool alone = board.has_marker_corners() && board.corners() == 4;
-    return kind.type == board.type && (board.type != TargetType::kMarkerGrid ||
-                                       (kind.alone == alone && family_fits(kind, board.dictionary)));
+    return kind.type == board.type &&
+           (board.type != TargetType::kMarkerGrid || (kind.alone == alone && family_fits(kind, board.dictionary)));
   });
   return found == kKinds.end() ? kKinds.front() : *found;
 }
@@ -73,7 +73,8 @@ std::span<const std::string_view> dictionary_names() {
 }
 
 Result<BoardSpec> target_from_words(const TargetWords& words) {
-  const auto* const kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.name == words.type; });
+  const auto* const kind =
+      std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.name == words.type; });
   if (kind == kKinds.end()) {
     return failure(Fault::kConfigBadValue, "no target of type '{:.30}'; one of {}", words.type,
                    fmt::join(target_type_names(), ", "));

@@ -9,10 +9,10 @@ namespace {
 /// The picture of the pattern marker, 1 is dark; our own, since ARToolKit's "Hiro" is not ours to copy. Not symmetric
 /// under any turn, as much dark as white.
 constexpr std::array<std::uint16_t, kPatternCells> kPicture = {
-    0b1111111110000000, 0b1111111110000000, 0b1111111110000110, 0b1110000000001111, 0b1110000000001111,
-    0b1110000000000110, 0b1111111000000000, 0b1111111000011110, 0b1111111000011110, 0b1110000000000000,
-    0b1110000001111111, 0b1110000001111111, 0b1110000001110000, 0b1110000001110111, 0b1110011111110111,
-    0b0000011111110111};
+    0b1111111110000000, 0b1111111110000000, 0b1111111110000110, 0b1110000000001111,
+    0b1110000000001111, 0b1110000000000110, 0b1111111000000000, 0b1111111000011110,
+    0b1111111000011110, 0b1110000000000000, 0b1110000001111111, 0b1110000001111111,
+    0b1110000001110000, 0b1110000001110111, 0b1110011111110111, 0b0000011111110111};
 
 int floor_int(double x) { return static_cast<int>(std::floor(x)); }
 
@@ -25,8 +25,7 @@ Square square_at(const BoardSpec& board, double x_m, double y_m) {
 }
 
 bool is_square_dark(const BoardSpec& board, const Square& s) {
-  const bool on_pattern =
-      s.column >= -1 && s.row >= -1 && s.column < board.inner_columns && s.row < board.inner_rows;
+  const bool on_pattern = s.column >= -1 && s.row >= -1 && s.column < board.inner_columns && s.row < board.inner_rows;
   const bool turned = board.type == TargetType::kCharuco && board.legacy && (board.inner_rows + 1) % 2 == 0;
   return on_pattern && ((s.column + s.row) % 2 == 0) != turned;
 }
@@ -162,8 +161,8 @@ std::vector<InkShape> ink_shapes(const BoardSpec& board) {
   if (board.type == TargetType::kCircles || board.type == TargetType::kAsymmetricCircles) {
     for (int i = 0; i < board.corners(); ++i) {
       const Eigen::Vector2d center = board.corner(i).head<2>();
-      shapes.push_back({InkShape::Kind::kDisc, center.array() - board.mark_size_m / 2,
-                        center.array() + board.mark_size_m / 2});
+      shapes.push_back(
+          {InkShape::Kind::kDisc, center.array() - board.mark_size_m / 2, center.array() + board.mark_size_m / 2});
     }
   }
   if (board.type == TargetType::kPatternMarker) add_marker(board, 0, shapes);

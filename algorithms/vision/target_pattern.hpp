@@ -11,7 +11,7 @@ namespace firstlook {
 /// A dark shape in board coordinates.
 struct InkShape {
   enum class Kind : std::uint8_t { kRectangle, kDisc } kind = Kind::kRectangle;
-  Eigen::Vector2d low_m = Eigen::Vector2d::Zero();   ///< corners of the rectangle, or of the disc's bounding square
+  Eigen::Vector2d low_m = Eigen::Vector2d::Zero();  ///< corners of the rectangle, or of the disc's bounding square
   Eigen::Vector2d high_m = Eigen::Vector2d::Zero();
 };
 

@@ -37,10 +37,11 @@ int run_board_command(const BoardCommandOptions& options) {
   fmt::print(stderr, "{}: {}, on {} ({:.0f} x {:.0f} mm)\n", options.out, describe(*board), sheet->page.name,
              sheet->page.width_mm, sheet->page.height_mm);
   if (sheet->ambiguous) {
-    fmt::print(stderr,
-               "It looks the same upside down, so the order of its points must be guessed from the arm's motion; a "
-               "checkerboard of odd x even inner corners (9x6), an asymmetric circle grid with an odd number of rows, or "
-               "any marker board needs no guess.\n");
+    fmt::print(
+        stderr,
+        "It looks the same upside down, so the order of its points must be guessed from the arm's motion; a "
+        "checkerboard of odd x even inner corners (9x6), an asymmetric circle grid with an odd number of rows, or "
+        "any marker board needs no guess.\n");
   }
   fmt::print("{}", board_yaml(*board));
   std::fflush(stdout);

@@ -105,8 +105,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->check(CLI::IsMember(std::vector<std::string>(dictionaries.begin(), dictionaries.end())))
       ->capture_default_str();
   board_app->add_option("--first-id", board.words.first_id, "number of the first marker")->capture_default_str();
-  board_app->add_flag("--legacy", board.words.legacy, "ChArUco as OpenCV drew it before 4.7");
-  board_app->add_option("--page", board.page, "A4, A3, letter, or WIDTHxHEIGHT in mm (default: the smallest that fits)");
+  board_app->add_flag("--legacy", board.words.legacy, "ChArUco as OpenCV drew it before 4.6");
+  board_app->add_option("--page", board.page,
+                        "A4, A3, letter, or WIDTHxHEIGHT in mm (default: the smallest that fits)");
   board_app->add_option("-o,--out", board.out, "file to write")->capture_default_str();
 
   ReplayCommand replay;

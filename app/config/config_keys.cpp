@@ -85,27 +85,28 @@ void add_calibration_keys(Keys& keys, Config& c) {
                   30,
                   {},
                   "inner corners, circles or markers along a row; odd x even corners avoid a half-turn ambiguity"});
-  keys.push_back({"board.inner_rows", &c.board.inner_rows, 1, 30, {}, "the same along a column; boards of one marker ignore both"});
-  keys.push_back(
-      {"board.square_size_m", &c.board.square_size_m, 0.002, 1.0, {}, "distance of neighbours, side of one square or single marker: measure the print"});
+  keys.push_back({"board.inner_rows",
+                  &c.board.inner_rows,
+                  1,
+                  30,
+                  {},
+                  "the same along a column; boards of one marker ignore both"});
+  keys.push_back({"board.square_size_m",
+                  &c.board.square_size_m,
+                  0.002,
+                  1.0,
+                  {},
+                  "distance of neighbours, side of one square or single marker: measure the print"});
   keys.push_back({"board.mark_size_m",
                   &c.board.mark_size_m,
                   0,
                   1.0,
                   {},
                   "side of a marker's black square, or diameter of a circle; 0: usual for the type"});
-  keys.push_back({"board.dictionary",
-                  &c.board.dictionary,
-                  0,
-                  0,
-                  dictionary_names(),
+  keys.push_back({"board.dictionary", &c.board.dictionary, 0, 0, dictionary_names(),
                   "family of the markers; auto: usual for the type"});
   keys.push_back({"board.first_id", &c.board.first_id, 0, 4095, {}, "number of the first marker"});
-  keys.push_back({"board.detector",
-                  &c.board.detector,
-                  0,
-                  0,
-                  detector_preset_names(),
+  keys.push_back({"board.detector", &c.board.detector, 0, 0, detector_preset_names(),
                   "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
   keys.push_back({"calibration.views_min", &k.views_min, 3, 60, {}, "views of the board to take at least"});

@@ -39,7 +39,7 @@ struct CalibrationDataset {
 /// refused.
 /// @return kDataMissing or kDataMalformed, naming file and line
 [[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder,
-                                                                const DetectionOptions& detection = {});
+                                                                  const DetectionOptions& detection = {});
 
 /// board.yaml alone. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);

@@ -126,7 +126,8 @@ std::string board_yaml(const BoardSpec& board) {
     text += fmt::format("columns: {}\nrows: {}\nspacing_m: {}\n", words.columns, words.rows, words.spacing_m);
   }
   if (words.mark_size_m > 0) text += fmt::format("mark_size_m: {}\n", words.mark_size_m);
-  if (words.dictionary != "auto") text += fmt::format("dictionary: {}\nfirst_id: {}\n", words.dictionary, words.first_id);
+  if (words.dictionary != "auto")
+    text += fmt::format("dictionary: {}\nfirst_id: {}\n", words.dictionary, words.first_id);
   if (words.legacy) text += "legacy: true\n";
   return text;
 }

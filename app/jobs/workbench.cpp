@@ -1,5 +1,5 @@
-#include "app/config/board_config.hpp"
 #include "app/jobs/workbench.hpp"
+#include "app/config/board_config.hpp"
 
 #include <algorithm>
 

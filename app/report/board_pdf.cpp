@@ -149,9 +149,10 @@ std::string pdf_file(const PageSize& page, const std::string& contents) {
   const std::array<std::string, 5> objects = {
       "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
       "<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-      fmt::format("<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4f} {:.4f}] /Contents 4 0 R /Resources << /Font << /F1 "
-                  "5 0 R >> >> >>",
-                  page.width_mm * kPointsOfMm, page.height_mm * kPointsOfMm),
+      fmt::format(
+          "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4f} {:.4f}] /Contents 4 0 R /Resources << /Font << /F1 "
+          "5 0 R >> >> >>",
+          page.width_mm * kPointsOfMm, page.height_mm * kPointsOfMm),
       fmt::format("<< /Length {} >>\nstream\n{}endstream", contents.size(), contents),
       "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>"};
   std::string file = "%PDF-1.6\n";
@@ -171,7 +172,8 @@ std::string pdf_file(const PageSize& page, const std::string& contents) {
 
 std::optional<PageSize> find_page(std::string_view name) {
   std::string lower(name);
-  std::ranges::transform(lower, lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  std::ranges::transform(lower, lower.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   if (lower == "a4") return kPages[0];
   if (lower == "letter") return kPages[1];
   if (lower == "a3") return kPages[2];

@@ -19,13 +19,13 @@ struct PageSize {
 
 struct BoardSheet {
   std::string pdf;
-  PageSize page;             ///< as laid out: turned when that fits better
-  bool ambiguous = false;    ///< looks the same upside down
+  PageSize page;           ///< as laid out: turned when that fits better
+  bool ambiguous = false;  ///< looks the same upside down
 };
 
-/// One page of vector graphics: the target in the middle, above it a line with all parameters, below it rulers across and
-/// along the page to check the print with. The same arguments give the same bytes. Without a page the smallest of A4,
-/// letter and A3 that holds it.
+/// One page of vector graphics: the target in the middle, above it a line with all parameters, below it rulers across
+/// and along the page to check the print with. The same arguments give the same bytes. Without a page the smallest of
+/// A4, letter and A3 that holds it.
 /// @return kConfigBadValue for a bad target, or one that does not fit, with the sizes
 [[nodiscard]] Result<BoardSheet> board_sheet(const BoardSpec& board, const std::optional<PageSize>& page);
 

@@ -364,8 +364,7 @@ TEST_CASE("the recorded Franka set gives its published transform, with honest si
   }
 }
 
-TEST_CASE("boards of markers: half of the points in each view, from corners and from images",
-          "[app][calibration]") {
+TEST_CASE("boards of markers: half of the points in each view, from corners and from images", "[app][calibration]") {
   Setup setup;
   setup.board = {5, 4, 0.055, TargetType::kMarkerGrid, 0.044, MarkerDictionary::kAprilTag36h11};
   Random random(64);

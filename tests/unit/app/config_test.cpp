@@ -38,7 +38,7 @@ Config all_changed() {
   c.keep_out = {{{-1, -2, 0}, {1, -1.5, 2}}, {{0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}}};
   c.camera_envelope_radius_m = 0.15;
   c.parking_rad = JointVector{0, -1.5707963267948966, 1e-17, 0.5, -0.25, 3};
-  c.board = {"checkerboard", 7, 5, 0.0251};
+  c.board = {"charuco", 7, 5, 0.0251, 0.018, "5x5_100", 3, "thesis2014"};
   c.calibration = {"tsai-lenz",
                    9,
                    31,

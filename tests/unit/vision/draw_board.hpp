@@ -28,7 +28,7 @@ struct DrawOptions {
   std::uint64_t seed = 1;
   double blur_px = 0;  ///< sigma of a Gaussian
   /// True where something stands before the target, in board coordinates; it is as dark as the wall.
-  std::function<bool(const Eigen::Vector2d&)> hidden;
+  std::function<bool(const Eigen::Vector2d&)> hidden{};
 };
 
 /// The square (column, row) whose corner with the smallest coordinates is inner corner (column, row) is black when

@@ -14,7 +14,8 @@ constexpr CameraIntrinsics kCamera{640, 480, 534.78, 534.10, 308.63, 226.92, .04
 std::vector<Eigen::Vector2d> seen(const BoardSpec& board, const Pose& pose, double sigma_px, Random& random) {
   std::vector<Eigen::Vector2d> px;
   for (int i = 0; i < board.corners(); ++i) {
-    px.push_back(*project(kCamera, pose * board.corner(i)) + sigma_px * Eigen::Vector2d(random.normal(), random.normal()));
+    px.push_back(*project(kCamera, pose * board.corner(i)) +
+                 sigma_px * Eigen::Vector2d(random.normal(), random.normal()));
   }
   return px;
 }
@@ -26,7 +27,8 @@ TEST_CASE("every solver finds the pose, with and without sampling", "[vision][pn
   for (const PnpMethod method : {PnpMethod::kIterative, PnpMethod::kP3p, PnpMethod::kEpnp, PnpMethod::kIppe}) {
     for (const bool ransac : {false, true}) {
       for (int trial = 0; trial < 20; ++trial) {
-        const Pose pose = look_at_board(board, 0.6, random.uniform(0.2, 0.7), random.uniform(0, 6), random.uniform(0, 6));
+        const Pose pose =
+            look_at_board(board, 0.6, random.uniform(0.2, 0.7), random.uniform(0, 6), random.uniform(0, 6));
         const auto exact = seen(board, pose, 0, random);
         PnpOptions options{method, std::nullopt};
         if (ransac) options.ransac = RansacOptions{};

@@ -58,7 +58,7 @@ const std::vector<Case> kCases = {
     {"aruco", {5, 4, .05, T::kMarkerGrid, .04, D::k4x4_50}},
     {"apriltag", {5, 4, .055, T::kMarkerGrid, .044, D::kAprilTag36h11}},
     {"artoolkitplus", {3, 3, .07, T::kMarkerGrid, .055, D::kArtoolkitPlusBch, 100}},
-    {"single marker", {1, 1, .1, T::kMarkerGrid, .1, D::kAprilTag36h11, 5}},
+    {"single marker", {1, 1, .1, T::kMarkerGrid, .1, D::kAprilTag36h11, 300}},
     {"pattern", {1, 1, .1, T::kPatternMarker, .1}},
 };
 

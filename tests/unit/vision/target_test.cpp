@@ -36,7 +36,8 @@ TEST_CASE("every target's ink is where its shapes are", "[vision][target]") {
       const Eigen::Vector2d at = extent.center_m + 0.6 * Eigen::Vector2d(random.uniform(-1, 1) * extent.size_m.x(),
                                                                          random.uniform(-1, 1) * extent.size_m.y());
       const bool inked = std::any_of(shapes.begin(), shapes.end(), [&](const InkShape& s) {
-        if (s.kind == InkShape::Kind::kRectangle) return (at - s.low_m).minCoeff() >= 0 && (s.high_m - at).minCoeff() > 0;
+        if (s.kind == InkShape::Kind::kRectangle)
+          return (at - s.low_m).minCoeff() >= 0 && (s.high_m - at).minCoeff() > 0;
         return (at - (s.low_m + s.high_m) / 2).norm() < (s.high_m - s.low_m).x() / 2;
       });
       REQUIRE(is_dark(board, at.x(), at.y()) == inked);
