@@ -102,10 +102,13 @@ CommonBoard fit_board(const std::vector<BoardReading>& readings, const Eigen::Ma
 }
 
 /// Noise of a corner, from what is left when each view has its own pose of the board (six parameters).
-double shown_corner_sigma(std::span<const SeenView> seen, const BoardSpec& board) {
-  const double coordinates = 2.0 * board.corners();
-  double squared_px = 0;
-  for (const SeenView& s : seen) squared_px += s.pose.residual_rms_px * s.pose.residual_rms_px;
+double shown_corner_sigma(std::span<const SeenView> seen) {
+  double squared_px = 0, corners = 0;
+  for (const SeenView& s : seen) {
+    squared_px += s.pose.residual_rms_px * s.pose.residual_rms_px;
+    corners += static_cast<double>(s.view->corners_px.size());
+  }
+  const double coordinates = 2 * corners / static_cast<double>(seen.size());
   return std::sqrt(squared_px / static_cast<double>(seen.size()) * coordinates / (coordinates - 6));
 }
 
@@ -184,7 +187,7 @@ Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const Board
                                      const VerificationLimits& limits) {
   std::vector<SeenView> seen;
   for (const CalibrationView& view : views) {
-    const auto pose = estimate_board_pose_robust(camera, board, view.corners_px);
+    const auto pose = estimate_board_pose_robust(camera, board, view.points());
     if (pose) seen.push_back({&view, pose->pose});
   }
   const auto count = static_cast<int>(seen.size());
@@ -192,7 +195,7 @@ Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const Board
     return failure(Fault::kTooFewViews, "{} usable views of the board, {} are the least", count, limits.views_min);
   }
   HandEyeClaim claim = stated;
-  claim.corner_sigma_px = std::max(stated.corner_sigma_px, shown_corner_sigma(seen, board));
+  claim.corner_sigma_px = std::max(stated.corner_sigma_px, shown_corner_sigma(seen));
   std::vector<BoardReading> readings;
   for (const SeenView& s : seen) readings.push_back(read_board(s, claim));
   const CommonBoard common = fit_board(readings, joint_information(readings, claim.covariance));

@@ -101,7 +101,8 @@ Status Workbench::take_memory() {
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
-  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * sizeof(Eigen::Vector2d);
+  const std::size_t point = sizeof(Eigen::Vector2d) + (board_.allows_partial_views() ? sizeof(int) : 0);
+  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * point;
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,

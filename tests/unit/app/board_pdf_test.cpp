@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <sstream>
 
+#include "algorithms/vision/target_detection.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "algorithms/vision/target_pattern.hpp"
 
@@ -74,4 +75,33 @@ TEST_CASE("pages are chosen, turned, and refused with the numbers", "[app][board
   CHECK(board_sheet(board(0.1), find_page("1200x1000")));
   for (const char* name : {"A5", "100", "100x", "x100", "100x5", "1e9x10", "nanxnan", ""}) CHECK_FALSE(find_page(name));
   CHECK(board_sheet(target_from_words({"checkerboard", 8, 6, 0.02}).value(), std::nullopt)->ambiguous);
+}
+
+TEST_CASE("a print of the PDF is found by our detectors, its points right to 0.1 mm", "[app][board]") {
+  constexpr double kPixelsOfMm = 6;
+  for (const TargetWords& words : {TargetWords{"checkerboard", 9, 6, 0.0236}, TargetWords{"charuco", 6, 4, 0.03},
+                                   TargetWords{"apriltag", 4, 3, 0.05}, TargetWords{"artoolkitplus", 3, 2, 0.07},
+                                   TargetWords{"artoolkit", 1, 1, 0.12}}) {
+    const BoardSpec board = target_from_words(words).value();
+    const auto sheet = board_sheet(board, std::nullopt);
+    CAPTURE(words.type);
+    REQUIRE(sheet);
+    const int width = static_cast<int>(sheet->page.width_mm * kPixelsOfMm);
+    const int height = static_cast<int>(sheet->page.height_mm * kPixelsOfMm);
+    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * height), 235);
+    for (const Rectangle& r : rectangles_of(sheet->pdf)) {
+      const auto pixel = [&](double mm) { return static_cast<int>(std::lround(mm * kPixelsOfMm)); };
+      for (int v = height - pixel(r.y + r.height); v < height - pixel(r.y); ++v) {
+        std::fill_n(pixels.begin() + v * width + pixel(r.x), pixel(r.x + r.width) - pixel(r.x), std::uint8_t{20});
+      }
+    }
+    const auto found = detect_target({pixels.data(), width, height}, board);
+    REQUIRE(found);
+    REQUIRE(found->ids.empty());
+    // Edges were put between pixels, at most half a pixel (0.083 mm) off; all distances from the first point.
+    for (int i = 1; i < board.corners(); ++i) {
+      const Eigen::Vector2d mm = (found->corners_px[static_cast<std::size_t>(i)] - found->corners_px[0]) / kPixelsOfMm;
+      CHECK((mm - 1000 * (board.corner(i) - board.corner(0)).head<2>()).cwiseAbs().maxCoeff() < 0.1);
+    }
+  }
 }
