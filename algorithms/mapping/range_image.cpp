@@ -18,7 +18,7 @@ RangeImage::RangeImage(int width, int height) : width_(width), height_(height) {
   tile_farthest_m_.assign(static_cast<std::size_t>(blocks_x_ * tiles_for(level.height)) * kTilePixels, kNoRay);
   reach_m_.assign(static_cast<std::size_t>(level.width * level.height) * kTilePixels, kNoRay);
   while (true) {
-    level.tiles.assign(static_cast<std::size_t>(level.width * level.height), {});
+    level.tiles.assign(static_cast<std::size_t>(level.width) * static_cast<std::size_t>(level.height), {});
     levels_.push_back(level);
     if (level.width == 1 && level.height == 1) break;
     level.width = (level.width + 1) / 2;
@@ -67,7 +67,8 @@ void RangeImage::build_levels() {
             both = {std::min(both.nearest, part.nearest), std::max(both.farthest, part.farthest)};
           }
         }
-        levels_[l].tiles[static_cast<std::size_t>(y * levels_[l].width + x)] = both;
+        levels_[l].tiles[static_cast<std::size_t>(y) * static_cast<std::size_t>(levels_[l].width) +
+                         static_cast<std::size_t>(x)] = both;
       }
     }
   }

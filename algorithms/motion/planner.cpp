@@ -186,7 +186,7 @@ void Planner::skip_waypoints() {
 /// Replaces random corners by straight segments where that is shorter by 5 % of what it replaces or more.
 void Planner::cut_corners() {
   for (int attempt = 0; attempt < options_.shortcuts_max && chain_.size() > 2; ++attempt) {
-    const auto corner = static_cast<std::size_t>(1 + random_.below(static_cast<int>(chain_.size()) - 2));
+    const auto corner = 1 + static_cast<std::size_t>(random_.below(static_cast<int>(chain_.size()) - 2));
     const JointVector before = interpolate(chain_[corner], chain_[corner - 1], random_.uniform());
     const JointVector after = interpolate(chain_[corner], chain_[corner + 1], random_.uniform());
     const double around_m = distance_m(before, chain_[corner]) + distance_m(chain_[corner], after);

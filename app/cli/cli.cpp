@@ -40,12 +40,16 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       "seen to be free."};
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done, 2 usage, 3 configuration or data, 4 device missing, 5 calibration rejected, 6 safely "
+      "stopped, "
+      "70 internal fault.");
   app.failure_message(CLI::FailureMessage::simple);
 
   RunCommand run;
   ConfigFlags run_flags;
   std::string only = "everything", sensor = "full", calibration, views = "firstlook";
-  CLI::App* run_app = app.add_subcommand("run", "the whole job, in a simulated cell");
+  CLI::App* run_app = app.add_subcommand("run", "the whole job or a part of it, in a simulated cell");
   run_flags.add_to(*run_app);
   run_app->add_option("--only", only, "a part of the job; map and verify test a stored calibration first")
       ->check(CLI::IsMember({"everything", "calibrate", "map", "verify"}));
@@ -60,7 +64,8 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->check(CLI::IsMember({"full", "fast"}));
   run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
   run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
-  run_app->add_flag("--record", run.record, "keep the frames of the calibration as a dataset");
+  run_app->add_flag("--record", run.record,
+                    "keep the views of the board as a dataset that `firstlook calibrate` reads");
   run_app->add_flag("--real-time", run.real_time, "at the pace of the clock instead of virtual time");
   run_app->add_flag("--json", run.json, "print result.json on stdout at the end");
 
@@ -121,7 +126,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   ConfigCommandOptions config;
   ConfigFlags config_flags;
-  CLI::App* config_app = app.add_subcommand("config", "the configuration that a run would use, as commented YAML");
+  CLI::App* config_app = app.add_subcommand("config",
+                                            "what file, environment and flags say, as commented YAML; a simulated cell "
+                                            "sets arm.model, safe_zone, cart, board and depth itself");
   config_flags.add_to(*config_app);
   config_app->add_flag("--defaults", config.defaults, "the defaults alone");
 

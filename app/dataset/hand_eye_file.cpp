@@ -22,8 +22,8 @@ namespace {
 
 constexpr int kFormat = 1;
 constexpr std::size_t kFileBytesMax = 1 << 16;
-constexpr double kTranslationMax_m = 2;  // no bracket is longer; millimetres are
-constexpr double kSigmaMax_m = 0.1, kSigmaMax_rad = 0.5;
+constexpr double kTranslationMax_m = 2;                     // no bracket is longer; millimetres are
+constexpr double kSigmaMax_m = 0.02, kSigmaMax_rad = 0.05;  // far beyond any verdict; 0.1 mm taken for metres is 0.1
 
 /// What a file says in a wrong way; turned into an Error where the file is read.
 struct Complaint {

@@ -90,7 +90,8 @@ void describe_stored(const VerifiedCalibration& verified, json& hand_eye) {
   hand_eye["source"] = "stored";
   hand_eye["views_given"] = verified.calibration.views_given;
   hand_eye["solver"] = verified.calibration.solver;
-  for (const char* key : {"closed_form", "subset_spread", "ax_xb_residual"}) hand_eye[key] = nullptr;
+  for (const char* key : {"closed_form", "closed_form_matrix", "subset_spread", "ax_xb_residual"})
+    hand_eye[key] = nullptr;
   if (!verified.verification) {
     hand_eye["verification"] = {{"looks", verified.looks}, {"views", 0}};
     return;

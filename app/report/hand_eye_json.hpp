@@ -11,10 +11,9 @@ namespace firstlook {
 
 /// The contract's keys and, beside them, source (solved), verification (null), solver, closed_form, closed_form_matrix
 /// (3 rows of 4, the linear solution before its rotation was made one; null for other solvers), arm_sigma,
-/// corner_sigma_px, subset_spread,
-/// holdout_rms_mm, views_given and ax_xb_residual (rotation_rms_deg and translation_rms_mm of the board's pose in base
-/// against its mean; of AX = XB itself below all_pairs and consecutive). SI units unless the name says otherwise;
-/// numbers that do not apply (no corners) are null.
+/// corner_sigma_px, subset_spread, holdout_rms_mm, views_given and ax_xb_residual (rotation_rms_deg and
+/// translation_rms_mm of the board's pose in base against its mean; of AX = XB itself below all_pairs and consecutive).
+/// SI units unless the name says otherwise; numbers that do not apply (no corners) are null.
 [[nodiscard]] nlohmann::json hand_eye_json(const HandEyeResult& result, std::string_view parent_link,
                                            std::string_view solver);
 

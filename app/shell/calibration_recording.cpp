@@ -35,7 +35,8 @@ Status write_calibration_recording(const std::string& folder, const RunRecord& r
     poses += pose_row(image, view.base_T_flange);
     pictures = pictures && view.picture.width > 0;
     if (view.picture.width > 0) {
-      if (const Status s = write_file_atomically(folder + "/" + image, encode_png(view.picture)); !s) return s;
+      if (const Status s = write_file_atomically(fmt::format("{}/{}", folder, image), encode_png(view.picture)); !s)
+        return s;
     }
     for (std::size_t c = 0; c < view.detected_px.size(); ++c) {
       const int id = point_of(view.detected_ids, c), columns = board->inner_columns;
@@ -49,7 +50,7 @@ Status write_calibration_recording(const std::string& folder, const RunRecord& r
   texts.emplace_back("board.yaml", board_yaml(*board));
   if (record.intrinsics.width > 0) texts.emplace_back("camera_info.yaml", camera_info_yaml(record.intrinsics));
   for (const auto& [name, text] : texts) {
-    if (const Status s = write_file_atomically(folder + "/" + name, text); !s) return s;
+    if (const Status s = write_file_atomically(fmt::format("{}/{}", folder, name), text); !s) return s;
   }
   return {};
 }

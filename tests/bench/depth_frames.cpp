@@ -106,7 +106,7 @@ DepthFrames depth_frames(const Options& options, const FrameWish& wish) {
 }
 
 GridGeometry grid_around(const DepthFrames& frames, double resolution_m) {
-  const DepthRays rays(frames.sensor);
+  DepthRays rays(frames.sensor);
   AxisBox box;
   for (std::size_t i = 0; i < frames.frames.size(); ++i) {
     const AxisBox one = rays.bounds(frames.image(frames.frames[i]), frames.frames[i].base_T_depth);

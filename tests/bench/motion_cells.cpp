@@ -54,7 +54,7 @@ JointVector MotionCell::random_free_joints(Random& random) const {
     const JointVector q = random_joints(random);
     if (configuration_is_free(arm, body, space, clearance, q, kTargetMargin_m)) return q;
   }
-  ENSURE(9101, false);
+  ENSURE(9201, false);
   return {};
 }
 

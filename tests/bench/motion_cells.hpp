@@ -29,7 +29,7 @@ struct MotionCell {
   [[nodiscard]] bool is_free(const JointVector& q_rad) const;
   /// Every joint within half a turn of zero.
   [[nodiscard]] JointVector random_joints(Random& random) const;
-  /// A free one, with 5 mm to spare; ENSURE 9101 after 100 000 tries.
+  /// A free one, with 5 mm to spare; ENSURE 9201 after 100 000 tries.
   [[nodiscard]] JointVector random_free_joints(Random& random) const;
 };
 

@@ -101,6 +101,11 @@ class ScriptedWorld : public DecisionSink {
     while (now < end && !ended) tick();
     return ended;
   }
+  /// How many paths of this phase were asked for.
+  [[nodiscard]] int plans_for(MotionPhase phase) const {
+    const auto found = plans_.find(phase);
+    return found == plans_.end() ? 0 : found->second;
+  }
   [[nodiscard]] bool was_in(StateId state) const {
     return std::find(visited.begin(), visited.end(), state) != visited.end();
   }
@@ -118,6 +123,58 @@ class ScriptedWorld : public DecisionSink {
     }
     answer_jobs();
     fire_timers();
+  }
+
+  /// What the script says to a job: its packed result; the size is returned.
+  std::size_t pack_answer(JobKind kind, std::span<const std::byte> arguments, std::span<std::byte> result) const {
+    switch (kind) {
+      case JobKind::kLocateViews:
+        return pack(views_around(arguments_of<FromHere>(arguments).at_rad, locate_views), result);
+      case JobKind::kIdentifyMotions:
+        return pack(views_around(arguments_of<FromHere>(arguments).at_rad, 6), result);
+      case JobKind::kPlan:
+        return pack(plan(arguments_of<PlanArguments>(arguments)), result);
+      case JobKind::kCertifyPath: {
+        PlanResult r;
+        r.found = true;
+        return pack(r, result);
+      }
+      case JobKind::kDetectBoard:
+        return pack(detect(arguments_of<DetectArguments>(arguments)), result);
+      case JobKind::kNextCalibrationView: {
+        CalibrationViewResult r;
+        r.found = true;
+        r.path = beside(arguments);
+        return pack(r, result);
+      }
+      case JobKind::kNextVerificationView: {
+        VerificationViewResult r = verification_view;
+        r.path = beside(arguments);
+        return pack(r, result);
+      }
+      case JobKind::kVerifyCalibration:
+        return pack(verify, result);
+      case JobKind::kSolve:
+        return pack(solve, result);
+      case JobKind::kValidate:
+        return pack(validate, result);
+      case JobKind::kIntegrate: {
+        IntegrateResult r = integrated;
+        r.at_view = arguments_of<IntegrateArguments>(arguments).at_view;
+        return pack(r, result);
+      }
+      case JobKind::kNextSweepView:
+      case JobKind::kNextView:
+        return pack(next_view(arguments_of<FromHere>(arguments)), result);
+      case JobKind::kCheckBoard:
+        return pack(check, result);
+      case JobKind::kSummarize:
+        return pack(SummarizeResult{}, result);
+      case JobKind::kForgetKnownFree:
+        return pack(NoArguments{}, result);
+    }
+    ENSURE(9002, false);
+    return 0;
   }
 
   // ---- DecisionSink
@@ -175,18 +232,12 @@ class ScriptedWorld : public DecisionSink {
     return r;
   }
   template <typename T>
-  static T arguments_of(const Job& job) {
+  static T arguments_of(std::span<const std::byte> arguments) {
     T value;
-    ENSURE(9001, unpack(std::span<const std::byte>(job.arguments), value));
+    ENSURE(9001, unpack(arguments, value));
     return value;
   }
-  template <typename T>
-  void answer(const Job& job, const T& result) {
-    std::vector<std::byte> bytes(16384);
-    const std::size_t size = pack(result, std::span<std::byte>(bytes));
-    machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size), {}});
-  }
-  ViewList views_around(const JointVector& at, int count) const {
+  static ViewList views_around(const JointVector& at, int count) {
     ViewList list;
     for (int i = 0; i < count; ++i) {
       JointVector q = at;
@@ -195,7 +246,16 @@ class ScriptedWorld : public DecisionSink {
     }
     return list;
   }
+  /// A view beside where the arm stands.
+  static Route beside(std::span<const std::byte> from_here) {
+    JointVector to = arguments_of<FromHere>(from_here).at_rad;
+    to[4] += 0.05;
+    Route route;
+    route.push_back({to, 0.5, 1.0});
+    return route;
+  }
   void answer_jobs() {
+    std::vector<std::byte> bytes(16384);
     while (!jobs_.empty() && !ended) {
       const Job job = jobs_.front();
       jobs_.pop_front();
@@ -203,70 +263,10 @@ class ScriptedWorld : public DecisionSink {
         machine.on_event(now, JobCompleted{job.kind, job.number, {}, Fault::kOutOfMemory});
         continue;
       }
-      switch (job.kind) {
-        case JobKind::kLocateViews:
-          answer(job, views_around(position_, locate_views));
-          break;
-        case JobKind::kIdentifyMotions:
-          answer(job, views_around(position_, 6));
-          break;
-        case JobKind::kPlan:
-          answer(job, plan(arguments_of<PlanArguments>(job)));
-          break;
-        case JobKind::kCertifyPath: {
-          PlanResult r;
-          r.found = true;
-          answer(job, r);
-          break;
-        }
-        case JobKind::kDetectBoard:
-          answer(job, detect(arguments_of<DetectArguments>(job)));
-          break;
-        case JobKind::kNextCalibrationView: {
-          CalibrationViewResult r;
-          r.found = true;
-          JointVector to = position_;
-          to[4] += 0.05;
-          r.path.push_back({to, 0.5, 1.0});
-          answer(job, r);
-          break;
-        }
-        case JobKind::kNextVerificationView: {
-          VerificationViewResult r = verification_view;
-          JointVector to = position_;
-          to[4] += 0.05;
-          r.path.push_back({to, 0.5, 1.0});
-          answer(job, r);
-          break;
-        }
-        case JobKind::kVerifyCalibration:
-          answer(job, verify);
-          break;
-        case JobKind::kSolve:
-          answer(job, solve);
-          break;
-        case JobKind::kValidate:
-          answer(job, validate);
-          break;
-        case JobKind::kIntegrate: {
-          IntegrateResult r = integrated;
-          r.at_view = arguments_of<IntegrateArguments>(job).at_view;
-          answer(job, r);
-          break;
-        }
-        case JobKind::kNextSweepView:
-        case JobKind::kNextView:
-          answer(job, next_view(arguments_of<FromHere>(job)));
-          break;
-        case JobKind::kCheckBoard:
-          answer(job, check);
-          break;
-        case JobKind::kSummarize:
-          answer(job, SummarizeResult{});
-          break;
-        case JobKind::kForgetKnownFree:  // the shell's own
-          break;
-      }
+      if (job.kind == JobKind::kForgetKnownFree) continue;  // the shell's own
+      if (job.kind == JobKind::kPlan) ++plans_[arguments_of<PlanArguments>(job.arguments).phase];
+      const std::size_t size = pack_answer(job.kind, job.arguments, bytes);
+      machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size), {}});
     }
   }
   void fire_timers() {
@@ -292,6 +292,7 @@ class ScriptedWorld : public DecisionSink {
   std::uint32_t segment_ = 0;
   std::uint32_t frames_ = 0;
   int ticks_ = 0;
+  std::map<MotionPhase, int> plans_;
   bool machine_refusal_ = false;
 };
 

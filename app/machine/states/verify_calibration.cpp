@@ -38,7 +38,9 @@ void take(Machine& m, const VerificationViewResult& choice) {
 }
 
 void conclude(Machine& m, const VerifyResult& result) {
-  m.show("chi-square {:.1f}, allowed {:.1f}; {:.2f} px", result.chi2, result.chi2_limit, result.residual_rms_px);
+  if (result.chi2_limit > 0) {
+    m.show("chi-square {:.1f}, allowed {:.1f}; {:.2f} px", result.chi2, result.chi2_limit, result.residual_rms_px);
+  }
   if (!result.accepted) {
     m.conclude(Outcome::kCalibrationRejected, Fault::kCalibrationRejected);
   } else if (m.settings().scope == RunScope::kVerify) {

@@ -20,13 +20,15 @@ const JointVector kStart{0, -1.57, 1.57, -1.57, -1.57, 0};  // the simulated cel
 /// The flange's camera looks at a board 0.7 m ahead of where the arm starts; the depth camera at a wall.
 class Bench {
  public:
-  Bench() : color_(kColor), workers_(2) {
+  explicit Bench(std::optional<StoredCalibration> stored = std::nullopt) : color_(kColor), workers_(2) {
     color_.corners = [this](const hal::Frame&) { return seen_from(at_rad_); };
     const Pose base_T_camera = forward(arm_, kStart).flange().pose() * flange_T_camera_;
     Pose camera_T_board = Pose::Identity();
     camera_T_board.translation() = Eigen::Vector3d(0, 0, 0.7) - board_.center();
     base_T_board_ = base_T_camera * camera_T_board;
-    auto bench = Workbench::make(config_, {kStart, Transform<Camera, Depth>(), std::nullopt}, color_, depth_, workers_);
+    if (stored) config_.safe_zone = {1.0, 1.5};  // room to go for views
+    auto bench =
+        Workbench::make(config_, {kStart, Transform<Camera, Depth>(), std::move(stored)}, color_, depth_, workers_);
     REQUIRE(bench);
     bench_ = std::move(*bench);
     jobs_.emplace(*bench_);
@@ -107,6 +109,19 @@ class Bench {
     REQUIRE(result_of<SolveResult>(JobKind::kSolve, NoArguments{}).solved);
     REQUIRE(result_of<ValidateResult>(JobKind::kValidate, NoArguments{}).accepted);
   }
+  /// Looks and goes where the verification wants to, until it has views enough. Returns how many views it took.
+  int take_verification_views() {
+    JointVector at = kStart;
+    int views = result_of<DetectResult>(JobKind::kDetectBoard, look(BoardLook::kVerify, at)).found ? 1 : 0;
+    for (std::uint32_t step = 0; step < 20; ++step) {
+      const auto choice = result_of<VerificationViewResult>(JobKind::kNextVerificationView, FromHere{at, step, 0});
+      if (choice.target_met || !choice.found) break;
+      at = choice.path.back().target_rad;
+      if (result_of<DetectResult>(JobKind::kDetectBoard, look(BoardLook::kVerify, at)).found) ++views;
+    }
+    return views;
+  }
+  [[nodiscard]] const Workbench& bench() const { return *bench_; }
   mock::MockDepthCamera& depth() { return depth_; }
   CartJobs& jobs() { return *jobs_; }
 
@@ -140,6 +155,22 @@ class Bench {
   std::unique_ptr<JobRequest> request_ = std::make_unique<JobRequest>();
   std::array<std::byte, kJobResultBytesMax> result_{};
 };
+
+/// What a good calibration of the bench would have left.
+StoredCalibration stored_calibration() {
+  StoredCalibration c;
+  c.accepted = true;
+  c.arm_model = "ur5";
+  c.kinematics = kinematics_checksum(*find_arm_model("ur5"));
+  c.flange_T_camera = Transform<Flange, Camera>(Pose(Eigen::Translation3d(0, -0.07, 0.06)));
+  c.covariance = 1e-8 * Matrix6d::Identity();
+  c.corner_sigma_px = 0.05;
+  c.arm_sigma = {1e-4, 2e-4};
+  c.intrinsics = kColor;
+  c.solver = "park-martin";
+  c.views = c.views_given = 16;
+  return c;
+}
 
 /// Lets the 1st, 2nd, 3rd and then rarer and rarer allocation of the job fail, until it gets by without. Each time the
 /// job fails with kOutOfMemory, or whoever allocated could do without; the process is there afterwards.
@@ -187,6 +218,81 @@ TEST_CASE("no failed allocation of a calibration job ends the process", "[jobs]"
   fail_every_allocation(bench, JobKind::kNextCalibrationView, [&] { return bench.here(3); });
   fail_every_allocation(bench, JobKind::kSolve, [] { return NoArguments{}; });
   fail_every_allocation(bench, JobKind::kValidate, [] { return NoArguments{}; });
+}
+
+TEST_CASE("no failed allocation of a verification ends the process", "[jobs]") {
+  Bench bench(stored_calibration());
+  bench.take_verification_views();
+  fail_every_allocation(bench, JobKind::kNextVerificationView, [&] { return bench.here(3); });
+  fail_every_allocation(bench, JobKind::kVerifyCalibration, [] { return NoArguments{}; });
+}
+
+TEST_CASE("the right stored calibration is verified on a few views and gives the clearance", "[jobs]") {
+  Bench bench(stored_calibration());
+  const int views = bench.take_verification_views();
+  CHECK(views >= 3);
+  CHECK(views <= 5);
+  const auto result = bench.result_of<VerifyResult>(JobKind::kVerifyCalibration, NoArguments{});
+  for (const std::string& reason : bench.bench().hand_eye()->reasons) UNSCOPED_INFO(reason);
+  CHECK(result.accepted);
+  CHECK(result.chi2 < result.chi2_limit);
+  CHECK(result.clearance_m > 0.05);
+  const HandEyeResult& hand_eye = *bench.bench().hand_eye();
+  CHECK(hand_eye.verdict == Verdict::kAccepted);
+  CHECK(hand_eye.reasons.empty());
+  CHECK(hand_eye.views == 16);  // of the solve that made it
+  CHECK(hand_eye.holdout_rms_px == result.residual_rms_px);
+  REQUIRE(bench.bench().verified());
+  CHECK(bench.bench().verified()->verification->views.size() == static_cast<std::size_t>(views));
+  CHECK(bench.bench().calibration_records().size() == static_cast<std::size_t>(views));
+  // The board stands where it did: it can be looked at again at the end of the job.
+  const auto check = bench.result_of<CheckBoardResult>(JobKind::kCheckBoard, bench.look(BoardLook::kConclude, kStart));
+  CHECK(check.seen);
+  CHECK_FALSE(check.moved);
+}
+
+TEST_CASE("a stored calibration of another mount is rejected, with figure and limit", "[jobs]") {
+  StoredCalibration other = stored_calibration();
+  Vector6d error = Vector6d::Zero();
+  SECTION("5 mm") { error[1] = 0.005; }
+  SECTION("1 degree") { error[3] = 0.01745; }
+  SECTION("so wrong that the board is not where it says") { error[4] = 0.6; }
+  other.flange_T_camera = Transform<Flange, Camera>(perturb(other.flange_T_camera.pose(), error));
+  Bench bench(other);
+  CHECK(bench.take_verification_views() >= 3);
+  const auto result = bench.result_of<VerifyResult>(JobKind::kVerifyCalibration, NoArguments{});
+  CHECK_FALSE(result.accepted);
+  CHECK(result.chi2 > result.chi2_limit);
+  CHECK(result.clearance_m == 0);
+  CHECK_FALSE(bench.bench().clearance_terms());
+  const HandEyeResult& hand_eye = *bench.bench().hand_eye();
+  CHECK(hand_eye.verdict == Verdict::kRejected);
+  REQUIRE_FALSE(hand_eye.reasons.empty());
+  CHECK_THAT(hand_eye.reasons[0], Catch::Matchers::Contains("chi-square") && Catch::Matchers::Contains("allowed"));
+  CHECK_FALSE(bench.bench().verified()->calibration.accepted);
+}
+
+TEST_CASE("a stored calibration that is too vague, or seen too little, is rejected", "[jobs]") {
+  StoredCalibration vague = stored_calibration();
+  SECTION("vague") {
+    vague.covariance *= 1000;
+    Bench bench(vague);
+    bench.take_verification_views();
+    CHECK_FALSE(bench.result_of<VerifyResult>(JobKind::kVerifyCalibration, NoArguments{}).accepted);
+    CHECK_THAT(bench.bench().hand_eye()->reasons[0], Catch::Matchers::Contains("sigma of translation"));
+  }
+  SECTION("two views") {
+    Bench bench(vague);
+    JointVector turned = kStart;
+    turned[5] += 0.4;
+    for (const JointVector& q : {kStart, turned}) {
+      CHECK(bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look(BoardLook::kVerify, q)).found);
+    }
+    CHECK_FALSE(bench.result_of<VerifyResult>(JobKind::kVerifyCalibration, NoArguments{}).accepted);
+    CHECK_THAT(bench.bench().hand_eye()->reasons[0], Catch::Matchers::Contains("2 usable views"));
+    CHECK_FALSE(bench.bench().verified()->verification);
+    CHECK(bench.bench().calibration_records().size() == 2);
+  }
 }
 
 TEST_CASE("no failed allocation of a mapping job ends the process", "[jobs]") {

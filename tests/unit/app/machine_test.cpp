@@ -284,6 +284,124 @@ TEST_CASE("an obstacle that a frame shows on the way stops the arm and another w
   CHECK(world.ending.outcome == Outcome::kDone);
 }
 
+namespace {
+MachineSettings with_scope(RunScope scope) {
+  MachineSettings s = ScriptedWorld::default_settings();
+  s.scope = scope;
+  return s;
+}
+int looks_to_verify(const ScriptedWorld& world) {
+  return static_cast<int>(std::count_if(world.shown.begin(), world.shown.end(),
+                                        [](const std::string& line) { return line.starts_with("verification view"); }));
+}
+}  // namespace
+
+TEST_CASE("calibrate only: no mapping, and no word of a stored calibration", "[machine]") {
+  ScriptedWorld world(with_scope(RunScope::kCalibrate));
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+  CHECK(world.was_in(StateId::kValidate));
+  for (const StateId state : {StateId::kVerifyCalibration, StateId::kSweep, StateId::kVerifyBoard}) {
+    CHECK_FALSE(world.was_in(state));
+  }
+}
+
+TEST_CASE("verify only: three views test the stored calibration, and the arm parks", "[machine]") {
+  ScriptedWorld world(with_scope(RunScope::kVerify));
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+  CHECK_FALSE(world.ending.has_fault);
+  for (const StateId state : {StateId::kLocateBoard, StateId::kVerifyCalibration, StateId::kPark, StateId::kReport}) {
+    INFO(state_row(state).name);
+    CHECK(world.was_in(state));
+  }
+  for (const StateId state : {StateId::kIdentifyLink, StateId::kCollect, StateId::kSolve, StateId::kValidate,
+                              StateId::kSweep, StateId::kVerifyBoard}) {
+    INFO(state_row(state).name);
+    CHECK_FALSE(world.was_in(state));
+  }
+  CHECK(looks_to_verify(world) == 2);  // besides the one from where the board was found
+  CHECK(world.plans_for(MotionPhase::kMapping) == 0);
+}
+
+TEST_CASE("map only: the camera is trusted from the verification on, not before", "[machine]") {
+  ScriptedWorld world(with_scope(RunScope::kMap));
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kSweep));
+  CHECK(world.plans_for(MotionPhase::kMapping) == 0);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+  for (const StateId state : {StateId::kVerifyCalibration, StateId::kSweep, StateId::kLook, StateId::kVerifyBoard}) {
+    CHECK(world.was_in(state));
+  }
+  for (const StateId state : {StateId::kIdentifyLink, StateId::kCollect, StateId::kSolve, StateId::kValidate}) {
+    CHECK_FALSE(world.was_in(state));
+  }
+  CHECK(world.plans_for(MotionPhase::kMapping) > 0);
+}
+
+TEST_CASE("a stored calibration that fails its test maps nothing and is never trusted", "[machine]") {
+  const RunScope scope = GENERATE(RunScope::kMap, RunScope::kVerify);
+  ScriptedWorld world(with_scope(scope));
+  world.verify.accepted = false;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+  CHECK(world.ending.fault == Fault::kCalibrationRejected);
+  CHECK(world.was_in(StateId::kPark));
+  CHECK_FALSE(world.was_in(StateId::kSweep));
+  CHECK(world.plans_for(MotionPhase::kMapping) == 0);
+}
+
+TEST_CASE("more views where three leave the test too weak, but not without end", "[machine]") {
+  ScriptedWorld world(with_scope(RunScope::kVerify));
+  world.verification_view.target_met = false;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(looks_to_verify(world) == 7);
+  CHECK(world.ending.outcome == Outcome::kDone);  // the job that tests decides
+}
+
+TEST_CASE("a board that is lost while verifying leaves the verdict to what was seen", "[machine]") {
+  ScriptedWorld world(with_scope(RunScope::kMap));
+  world.detect = [](const DetectArguments& a) {
+    DetectResult r;
+    r.found = a.purpose == BoardLook::kLocate;
+    return r;
+  };
+  world.verification_view.found = false;
+  world.verify.accepted = false;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+}
+
+TEST_CASE("a pause while verifying goes on with the views that are missing", "[machine]") {
+  ScriptedWorld world(with_scope(RunScope::kMap));
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kVerifyCalibration));
+  for (int i = 0; i < 150; ++i) world.tick();
+  REQUIRE(world.machine.state() == StateId::kVerifyCalibration);
+  world.consent = false;
+  world.tick();
+  CHECK(world.machine.state() == StateId::kPaused);
+  for (int i = 0; i < 300; ++i) world.tick();
+  world.consent = true;
+  for (int i = 0; i < 3; ++i) world.tick();
+  CHECK(world.machine.state() == StateId::kVerifyCalibration);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+}
+
 TEST_CASE("the state table is sound", "[machine]") {
   std::set<std::string_view> names;
   for (const StateRow& row : state_table()) {

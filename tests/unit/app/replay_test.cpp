@@ -213,6 +213,17 @@ TEST_CASE("the hash at the end is compared, too", "[replay]") {
   CHECK_THAT(std::string(replayed.error().detail()), Contains("another hash"));
 }
 
+TEST_CASE("a stored calibration is not looked up again: its file may be gone", "[replay]") {
+  Config config;
+  config.calibration.stored = "/nowhere/hand_eye.yaml";
+  config.calibration.verify_views = 5;
+  config.parking_rad = JointVector{0, -1.5, 1.5, 0, 0, 0};
+  const auto settings = settings_from_journal(journal_config(config, RunScope::kMap));
+  REQUIRE(settings);
+  CHECK(settings->scope == RunScope::kMap);
+  CHECK(settings->verify_views == 5);
+}
+
 TEST_CASE("what is not a job's record is refused", "[replay]") {
   CHECK(replay_journal("/nowhere/journal.flj").error().fault == Fault::kDataMissing);
   const std::string path =

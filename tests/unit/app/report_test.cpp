@@ -177,6 +177,51 @@ TEST_CASE("nothing that a robot would load is made from a rejected calibration",
   std::filesystem::remove_all(folder);
 }
 
+TEST_CASE("a stored calibration is told as such everywhere, and its file can be used again", "[report]") {
+  const auto folder = fresh_folder("stored");
+  RunRecord record = sample_record();
+  REQUIRE(write_run_files(folder.string(), record, {}));
+  auto stored = read_hand_eye(folder / "hand_eye.yaml");
+  if (!stored) FAIL(stored.error().detail());
+  CHECK(stored->views == record.hand_eye->views);
+  CHECK(stored->arm_model == "ur5");
+
+  record.verified = VerifiedCalibration{*stored, 4, Verification{}};
+  Verification& v = *record.verified->verification;
+  v.chi2 = 11.5;
+  v.chi2_limit = 32.9;
+  v.degrees_of_freedom = 12;
+  v.views.resize(3, VerifiedView{0.21, 0.0003, 0.0004});
+  record.hand_eye->fits.clear();
+  record.hand_eye->holdout_rms_px = 0.21;
+  const ordered_json json = ordered_json::parse(result_json(record))["hand_eye"];
+  CHECK(json["source"] == "stored");
+  CHECK(json["views"] == stored->views);
+  CHECK(json["views_given"] == stored->views_given);
+  CHECK(json["holdout_rms_px"] == 0.21);
+  CHECK(json["subset_spread"].is_null());
+  CHECK(json["verification"]["views"] == 3);
+  CHECK(json["verification"]["looks"] == 4);
+  CHECK(json["verification"]["chi2"] == 11.5);
+  CHECK(json["verification"]["residuals"][2]["board_shift_mm"] == Approx(0.3));
+  CHECK_THAT(done_text(record), Contains("stored calibration") && Contains("holds on 3 views"));
+  CHECK_THAT(report_html(record), Contains("stored, from") && Contains("χ² 11.5, allowed 32.9") &&
+                                      Contains("took no part in it") && !Contains("spread over subsets"));
+
+  const auto again = fresh_folder("stored_again");
+  REQUIRE(write_run_files(again.string(), record, {}));
+  CHECK(text_of(again / "hand_eye.yaml").size() > 500);
+  CHECK(read_hand_eye(again / "hand_eye.yaml"));
+  record.verified->calibration.accepted = false;
+  record.verified->verification.reset();
+  CHECK(ordered_json::parse(result_json(record))["hand_eye"]["verification"]["views"] == 0);
+  CHECK_FALSE(report_html(record).empty());
+  REQUIRE(write_run_files(again.string(), record, {}));
+  CHECK(read_hand_eye(again / "hand_eye.yaml").error().fault == Fault::kStoredCalibration);
+  std::filesystem::remove_all(folder);
+  std::filesystem::remove_all(again);
+}
+
 TEST_CASE("views.csv has one row for each look", "[report]") {
   const std::string csv = views_csv(sample_record());
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 25);

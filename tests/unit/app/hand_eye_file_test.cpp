@@ -1,0 +1,219 @@
+/// hand_eye.yaml: what a run writes a later one reads; every mistake in it is named with its line.
+#include "app/dataset/hand_eye_file.hpp"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+
+using namespace firstlook;
+using Catch::Matchers::Contains;
+
+namespace {
+
+StoredCalibration sample() {
+  StoredCalibration c;
+  c.accepted = true;
+  c.arm_model = "ur5";
+  c.kinematics = kinematics_checksum(*find_arm_model("ur5"));
+  c.flange_T_camera = Transform<Flange, Camera>(Eigen::Quaterniond(0.99, 0.1, -0.02, 0.03), {0.001, -0.07, 0.06});
+  Matrix6d root = 1e-4 * Matrix6d::Identity();
+  root(3, 1) = 0.4e-4;
+  root(5, 0) = -0.3e-4;
+  c.covariance = root * root.transpose();
+  c.corner_sigma_px = 0.025;
+  c.arm_sigma = {1.1e-4, 1.9e-4};
+  c.intrinsics = {640, 480, 537.33, 538.35, 321.61, 252.18, 0.17938, -0.31818, -0.00268, 0.00209, 0};
+  c.camera_T_depth = Transform<Camera, Depth>(Eigen::Quaterniond(1, 0.001, 0, 0), {-0.025, 0, 0});
+  c.solver = "park-martin";
+  c.views = 15;
+  c.views_given = 16;
+  c.reprojection_rms_px = 0.024;
+  c.holdout_rms_px = 0.16;
+  c.usable_distance_m = 28.4;
+  return c;
+}
+
+/// A file of this test, gone afterwards.
+class File {
+ public:
+  explicit File(const std::string& text)
+      : path_(std::filesystem::temp_directory_path() / ("firstlook_hand_eye_" + std::to_string(getpid()) + ".yaml")) {
+    std::ofstream(path_, std::ios::binary) << text;
+  }
+  ~File() { std::filesystem::remove(path_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// The sample's text with the line that begins with `key` replaced.
+std::string with_line(const std::string& key, const std::string& line) {
+  std::string text = hand_eye_yaml(sample());
+  const std::size_t at = text.find("\n" + key) + 1;
+  REQUIRE(at != std::string::npos + 1);
+  return text.replace(at, text.find('\n', at) - at, line);
+}
+
+int line_of(const std::string& text, const std::string& key) {
+  return 1 +
+         static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text.find(key)), '\n'));
+}
+
+std::string refused(const std::string& text, Fault fault = Fault::kDataMalformed) {
+  const File file(text);
+  INFO(text);
+  const auto read = read_hand_eye(file.path());
+  REQUIRE_FALSE(read);
+  CHECK(read.error().fault == fault);
+  CHECK_THAT(std::string(read.error().detail()), Contains(file.path().string()));
+  return std::string(read.error().detail());
+}
+
+std::string covariance_lines(const Matrix6d& covariance) {
+  StoredCalibration c = sample();
+  c.covariance = covariance;
+  return hand_eye_yaml(c);
+}
+
+}  // namespace
+
+TEST_CASE("a written calibration reads back whole", "[hand_eye_file]") {
+  const StoredCalibration c = sample();
+  const File file(hand_eye_yaml(c));
+  const auto read = read_hand_eye(file.path());
+  if (!read) FAIL(read.error().detail());
+  CHECK(read->accepted);
+  CHECK(read->arm_model == c.arm_model);
+  CHECK(read->kinematics == c.kinematics);
+  CHECK(pose_difference(read->flange_T_camera.pose(), c.flange_T_camera.pose()).norm() < 1e-15);
+  CHECK(read->flange_T_camera.translation() == c.flange_T_camera.translation());
+  CHECK((read->covariance - c.covariance).norm() < 1e-20);
+  CHECK(read->corner_sigma_px == c.corner_sigma_px);
+  CHECK(read->arm_sigma.translation_m == Approx(c.arm_sigma.translation_m));
+  CHECK(read->arm_sigma.rotation_rad == Approx(c.arm_sigma.rotation_rad));
+  CHECK(read->intrinsics == c.intrinsics);
+  CHECK(pose_difference(read->camera_T_depth.pose(), c.camera_T_depth.pose()).norm() < 1e-15);
+  CHECK(read->solver == c.solver);
+  CHECK(read->views == 15);
+  CHECK(read->views_given == 16);
+  CHECK(read->reprojection_rms_px == c.reprojection_rms_px);
+  CHECK(read->holdout_rms_px == c.holdout_rms_px);
+  CHECK(read->usable_distance_m == c.usable_distance_m);
+}
+
+TEST_CASE("a calibration that its own run rejected is refused, whatever else it says", "[hand_eye_file]") {
+  StoredCalibration c = sample();
+  c.accepted = false;
+  c.covariance(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  c.holdout_rms_px = 0;
+  CHECK_THAT(refused(hand_eye_yaml(c), Fault::kStoredCalibration), Contains("rejected by the run that made it"));
+}
+
+TEST_CASE("files that are none", "[hand_eye_file]") {
+  CHECK(read_hand_eye("/nowhere/hand_eye.yaml").error().fault == Fault::kDataMissing);
+  CHECK_FALSE(read_hand_eye(std::filesystem::temp_directory_path()));
+  CHECK_THAT(refused(""), Contains("not a list of keys"));
+  CHECK_THAT(refused("just words"), Contains(":1: not a list of keys"));
+  CHECK_THAT(refused("[1, 2"), Contains(":1:"));
+  CHECK_THAT(refused(with_line("verdict", "verdict: {accepted")), Contains(".yaml:"));
+  CHECK_THAT(refused(std::string(100'000, 'x')), Contains("65536"));
+  // What an older version wrote, or half a file.
+  const std::string whole = hand_eye_yaml(sample());
+  CHECK_THAT(refused(whole.substr(0, whole.find("usable_distance_m"))), Contains("no key usable_distance_m"));
+}
+
+TEST_CASE("keys: all of them, once, and no others", "[hand_eye_file]") {
+  const std::string whole = hand_eye_yaml(sample());
+  const std::string typo = with_line("verdict", "verdikt: accepted");
+  CHECK_THAT(refused(typo),
+             Contains(fmt::format(":{}:", line_of(typo, "verdikt"))) && Contains("'verdikt'; did you mean verdict?"));
+  CHECK_THAT(refused(whole + "views: 3\n"), Contains("views is given twice"));
+  CHECK_THAT(refused(with_line("  translation_m", "  translation: [0, 0, 0]")),
+             Contains("'translation'; did you mean translation_m?"));
+  CHECK_THAT(refused(with_line("format", "format: 2")), Contains(":2: format 2 is not known"));
+}
+
+TEST_CASE("values that cannot be", "[hand_eye_file]") {
+  const auto check = [](const std::string& key, const std::string& line, const std::string& complaint) {
+    const std::string text = with_line(key, line);
+    CHECK_THAT(refused(text), Contains(fmt::format(":{}:", line_of(text, line))) && Contains(complaint));
+  };
+  check("verdict", "verdict: splendid", "accepted or rejected");
+  check("parent_frame", "parent_frame: wrist_2_link", "'wrist_2_link'; only tool0");
+  check("child_frame", "child_frame: camera_link", "only camera_color_optical_frame");
+  check("translation_m", "translation_m: [1, -70, 60]", "looks like millimetres");
+  check("translation_m", "translation_m: [.nan, 0, 0]", "finite number, not '.nan'");
+  check("translation_m", "translation_m: [0, 0]", "list of 3 numbers");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 0, 0.99]", "norm 0.99");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 0, 5]", "is 5; must be between");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, .inf, 1]", "finite");
+  check("kinematics", "kinematics: 12xy", "16 hexadecimal digits");
+  check("corner_sigma_px", "corner_sigma_px: -1", "between 0 and 100");
+  check("solver", "solver: guess", "'guess' is not known");
+  check("views:", "views: 2", "views is 2");
+  check("views:", "views: 8.5", "whole number");
+  check("holdout_rms_px", "holdout_rms_px: nan", "finite");
+  check("arm_model", "arm_model: []", "must be a word");
+  check("intrinsics", "intrinsics: {image_width: 640, image_height: 480, fx_px: 0, fy_px: 538, cx_px: 320, cy_px: 240,",
+        "intrinsics.fx_px is 0");
+}
+
+TEST_CASE("a covariance must be one, in metres and radians", "[hand_eye_file]") {
+  Matrix6d c = sample().covariance;
+  c(0, 5) += 1e-9;
+  CHECK_THAT(refused(covariance_lines(c)), Contains("not symmetric: row 6 column 1"));
+  c = sample().covariance;
+  c(2, 4) = c(4, 2) = 1.01 * std::sqrt(c(2, 2) * c(4, 4));
+  CHECK_THAT(refused(covariance_lines(c)), Contains("not positive definite"));
+  c = sample().covariance;
+  c(1, 1) = 0;
+  CHECK_THAT(refused(covariance_lines(c)), Contains("not positive"));
+  c = sample().covariance;
+  c(3, 3) = -c(3, 3);
+  CHECK_THAT(refused(covariance_lines(c)), Contains("not positive"));
+  c = 1e6 * sample().covariance;  // mm^2 and mrad^2
+  CHECK_THAT(refused(covariance_lines(c)), Contains("must be in m^2 and rad^2"));
+  CHECK_THAT(refused(with_line("sigma_translation_mm", "sigma_translation_mm: [0.1, 0.2, 0.1]")),
+             Contains("one of them was changed"));
+}
+
+TEST_CASE("a calibration belongs to its arm and its cameras", "[hand_eye_file]") {
+  const StoredCalibration c = sample();
+  const ArmModel arm = *find_arm_model("ur5");
+  CHECK(check_belongs(c, arm, c.intrinsics, c.camera_T_depth));
+  const auto why = [&](const ArmModel& a, const CameraIntrinsics& k, const Transform<Camera, Depth>& depth) {
+    const Status status = check_belongs(c, a, k, depth);
+    REQUIRE_FALSE(status);
+    CHECK(status.error().fault == Fault::kStoredCalibration);
+    return std::string(status.error().detail());
+  };
+  CHECK_THAT(why(*find_arm_model("ur10e"), c.intrinsics, c.camera_T_depth), Contains("ur5, this one is ur10e"));
+  ArmModel corrected = arm;
+  corrected.dh[1].a_m += 1e-4;
+  CHECK_THAT(why(corrected, c.intrinsics, c.camera_T_depth), Contains("other kinematics of the ur5"));
+  CameraIntrinsics larger = c.intrinsics, other = c.intrinsics;
+  larger.width = 800;
+  CHECK_THAT(why(arm, larger, c.camera_T_depth), Contains("640x480, the camera gives 800x480"));
+  other.cy += 0.5;
+  CHECK_THAT(why(arm, other, c.camera_T_depth), Contains("0.5 px"));
+  other = c.intrinsics;
+  other.k2 += 0.001;
+  CHECK_THAT(why(arm, other, c.camera_T_depth), Contains("distortion by 0.001"));
+  const Transform<Camera, Depth> moved(c.camera_T_depth.quaternion(), {-0.022, 0, 0});
+  CHECK_THAT(why(arm, c.intrinsics, moved), Contains("3.00 mm"));
+}
+
+TEST_CASE("the kinematics checksum tells arms apart and forgives rounding", "[hand_eye_file]") {
+  ArmModel arm = *find_arm_model("ur5");
+  const std::uint64_t sum = kinematics_checksum(arm);
+  CHECK(kinematics_checksum(*find_arm_model("ur5e")) != sum);
+  arm.dh[3].d_m += 1e-12;
+  CHECK(kinematics_checksum(arm) == sum);
+  arm.dh[5].theta_offset_rad += 1e-6;
+  CHECK(kinematics_checksum(arm) != sum);
+}
