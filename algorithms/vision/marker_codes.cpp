@@ -77,7 +77,7 @@ std::optional<MarkerDictionary> find_marker_dictionary(std::string_view name) {
 
 std::uint64_t marker_code(MarkerDictionary dictionary, int id) {
   const Family& family = kFamilies[static_cast<std::size_t>(dictionary)];
-  ENSURE(2301, id >= 0 && id < family.facts.count);
+  ENSURE(2304, id >= 0 && id < family.facts.count);
   return family.codes.empty() ? bch_code(id) : family.codes[static_cast<std::size_t>(id)];
 }
 
