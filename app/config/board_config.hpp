@@ -9,7 +9,10 @@ namespace firstlook {
 /// @return kConfigBadValue with what is wrong
 [[nodiscard]] Result<BoardSpec> board_of(const Config::Board& board);
 
-/// The keys that stand for a board.
-[[nodiscard]] Config::Board board_config(const BoardSpec& board);
+/// Sets the keys that stand for a board; the detector stays.
+void set_board(const BoardSpec& board, Config::Board& config);
+
+/// True for keys that somebody changed: a board of his own, not the one that a simulated cell brings along.
+[[nodiscard]] bool names_a_board(const Config::Board& board);
 
 }  // namespace firstlook

@@ -76,9 +76,12 @@ void add_space_keys(Keys& keys, Config& c) {
                   "sphere at the flange that holds camera and gripper until the calibration is accepted"});
 }
 
+constexpr std::array<std::string_view, 2> kYesNo = {"no", "yes"};
+
 void add_calibration_keys(Keys& keys, Config& c) {
   Config::Calibration& k = c.calibration;
-  keys.push_back({"board.type", &c.board.type, 0, 0, target_type_names(), "kind of calibration board"});
+  keys.push_back({"board.type", &c.board.type, 0, 0, target_type_names(),
+                  "kind of calibration board; one that is set here hangs in the simulated cell, too"});
   keys.push_back({"board.inner_columns",
                   &c.board.inner_columns,
                   1,
@@ -106,6 +109,8 @@ void add_calibration_keys(Keys& keys, Config& c) {
   keys.push_back({"board.dictionary", &c.board.dictionary, 0, 0, dictionary_names(),
                   "family of the markers; auto: usual for the type"});
   keys.push_back({"board.first_id", &c.board.first_id, 0, 4095, {}, "number of the first marker"});
+  keys.push_back({"board.legacy", &c.board.legacy, 0, 0, kYesNo,
+                  "ChArUco as OpenCV drew it before 4.6: with an even number of rows of squares the first is white"});
   keys.push_back({"board.detector", &c.board.detector, 0, 0, detector_preset_names(),
                   "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});

@@ -266,7 +266,7 @@ Pose board_orientation(const Vector3d& faces, const Vector3d& center, double rol
 void read_board(const Section& cell, Scene& scene) {
   const Section board(cell.file(), cell.child("board"), "board",
                       {"center_m", "faces", "roll_deg", "type", "inner_columns", "inner_rows", "square_size_m",
-                       "mark_size_m", "dictionary", "first_id", "white_margin_m", "thickness_m"});
+                       "mark_size_m", "dictionary", "first_id", "legacy", "white_margin_m", "thickness_m"});
   BoardPlacement& placed = scene.board;
   TargetWords words;
   words.type = board.text_or("type", words.type);
@@ -276,6 +276,7 @@ void read_board(const Section& cell, Scene& scene) {
   words.mark_size_m = board.number_or("mark_size_m", 0, 0, 1);
   words.dictionary = board.text_or("dictionary", words.dictionary);
   words.first_id = board.integer_or("first_id", 0, 0, 4095);
+  words.legacy = board.flag_or("legacy", false);
   placed.white_margin_m = board.number_or("white_margin_m", placed.white_margin_m, 0, 1);
   placed.thickness_m = board.number_or("thickness_m", placed.thickness_m, 0.001, 0.2);
   const auto spec = target_from_words(words);

@@ -191,4 +191,11 @@ void move_board(Scene& scene, const Transform<Base, Board>& base_T_board) {
   scene.solids[scene.board_solid] = board_panel(scene.board);
 }
 
+void exchange_board(Scene& scene, const BoardSpec& board) {
+  Pose base_T_board = scene.board.base_T_board.pose();
+  base_T_board.translate(scene.board.spec.center() - board.center());
+  scene.board.spec = board;
+  move_board(scene, Transform<Base, Board>(base_T_board));
+}
+
 }  // namespace firstlook::sim

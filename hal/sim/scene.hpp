@@ -126,6 +126,9 @@ struct Scene {
 /// Puts the board elsewhere and its panel with it.
 void move_board(Scene& scene, const Transform<Base, Board>& base_T_board);
 
+/// Hangs another board at the same place: the middles of the points and the directions of the rows are the same.
+void exchange_board(Scene& scene, const BoardSpec& board);
+
 /// The panel that carries a board.
 [[nodiscard]] Solid board_panel(const BoardPlacement& board);
 

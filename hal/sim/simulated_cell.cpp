@@ -152,8 +152,9 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   const memory::SimulationScope simulation;
   const Result<Faults> faults = parse_faults(options.faults);
   if (!faults) return std::unexpected(faults.error());
-  const Result<Scene> scene = load_cell(options.cell, options.seed);
+  Result<Scene> scene = load_cell(options.cell, options.seed);
   if (!scene) return std::unexpected(scene.error());
+  if (options.board) exchange_board(*scene, *options.board);
   const std::optional<ArmModel> model = find_arm_model(scene->arm_model);
   if (!model) return failure(Fault::kCellInvalid, "{}: no arm model '{}'", scene->name, scene->arm_model);
   if (scene->start_rad.size() != model->joints) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,11 +21,12 @@
 namespace firstlook::sim {
 
 struct SimulationOptions {
-  std::string cell = "workshop";  ///< built-in name, "random:SEED", or a file
-  std::uint64_t seed = 1;         ///< of noise, deviations, faults and the true mount
-  bool fast_sensor = false;       ///< coarser depth, corners instead of pixels
-  std::string faults;             ///< faults.hpp
-  int workers = 2;                ///< threads of the observable set; results do not depend on it
+  std::string cell = "workshop";     ///< built-in name, "random:SEED", or a file
+  std::uint64_t seed = 1;            ///< of noise, deviations, faults and the true mount
+  bool fast_sensor = false;          ///< coarser depth, corners instead of pixels
+  std::string faults;                ///< faults.hpp
+  int workers = 2;                   ///< threads of the observable set; results do not depend on it
+  std::optional<BoardSpec> board{};  ///< hangs in the cell in place of the cell's own
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.

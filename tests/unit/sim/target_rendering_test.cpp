@@ -83,6 +83,19 @@ TEST_CASE("every target stands in a cell, is rendered, and found where it is") {
   }
 }
 
+TEST_CASE("a board of somebody's own hangs where the cell's was") {
+  auto scene = cell_with("roll_deg: 90");
+  REQUIRE(scene);
+  const BoardPlacement before = scene->board;
+  exchange_board(*scene, target_from_words({"apriltag", 4, 3, 0.07}).value());
+  CHECK((scene->board.base_T_board * scene->board.spec.center() - before.base_T_board * before.spec.center()).norm() <
+        1e-12);
+  CHECK((scene->board.base_T_board.rotation() - before.base_T_board.rotation()).norm() < 1e-12);
+  const Seen seen = look(*scene);
+  REQUIRE(seen.corners);
+  CHECK(seen.rms_px < 0.06);
+}
+
 TEST_CASE("a thing in front of a board of markers hides a part, and only that") {
   const std::string rod = "solids:\n  - {box: {size_m: [0.02, 0.5, 0.07]}, position_m: [0.8, 0, 0.25]}\n";
   for (const char* const type : {kTypes[2], kTypes[4]}) {
