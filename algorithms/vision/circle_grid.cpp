@@ -38,15 +38,17 @@ std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
   return Disc{{m.m10 / m.m00, m.m01 / m.m00}, std::sqrt(m.m00 / M_PI)};
 }
 
-void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
+/// False for a picture of noise, which it is at every window.
+bool add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
   constexpr double kDarker = 7;  // grey levels below the mean of the window
-  constexpr std::size_t kContoursMax = 20000;
   cv::Mat dark;
   cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
   std::vector<std::vector<cv::Point>> contours;
   std::vector<cv::Vec4i> tree;
   cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  if (contours.size() > kContoursMax) return;
+  // White noise has a contour for every 60 pixels, the densest grid that can be read for every 100.
+  constexpr std::size_t kPixelsMin = 100, kAlways = 6000;
+  if (contours.size() > std::max(kAlways, dark.total() / kPixelsMin)) return false;
   for (std::size_t i = 0; i < contours.size(); ++i) {
     constexpr int kParent = 3;
     if (tree[i][kParent] >= 0) continue;
@@ -54,6 +56,7 @@ void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
     const auto same = [&](const Disc& d) { return (d.center - disc->center).norm() < d.radius_px / 2; };
     if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);
   }
+  return true;
 }
 
 /// Centre of the darkness in a window around the disc: each pixel counts with the part of it that ink covers.
@@ -227,7 +230,7 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
   std::vector<std::size_t> grid;
   std::vector<Disc> discs;
   for (const int window : kWindows_px) {
-    add_discs(smooth, window, discs);
+    if (!add_discs(smooth, window, discs)) break;
     grid = find_grid(discs, board);
     if (!grid.empty()) break;
   }

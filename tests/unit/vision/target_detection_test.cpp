@@ -171,7 +171,7 @@ TEST_CASE("a bending lens does not make circle grids larger", "[vision][target]"
       }
     }
     CAPTURE(c.name);
-    CHECK(std::abs(outward_px) < 0.002);  // 0.01 without the lens in the discs' bias
+    CHECK(std::abs(outward_px) < 0.002);  // 0.03 without the lens in the discs' bias
   }
 }
 
