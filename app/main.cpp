@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "app/cli/cli.hpp"
+#include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"
@@ -75,7 +76,7 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.arm.model = cell.arm_model;
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
-  config.board = {"checkerboard", cell.board_columns, cell.board_rows, cell.board_square_m};
+  set_board(cell.board, config.board);
   config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
@@ -198,8 +199,10 @@ int run_job(const RunCommand& command) {
       command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
   if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
 
-  auto cell = sim::make_simulated_cell(
-      {config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor, command.faults, config.workers});
+  std::optional<BoardSpec> board;  // load_config has refused what is no board
+  if (names_a_board(config.board)) board = board_of(config.board).value();
+  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
+                                        command.faults, config.workers, board});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);
@@ -259,6 +262,7 @@ struct Dispatch {
   int operator()(const RunCommand& c) const { return run_job(c); }
   int operator()(const CalibrateCommandOptions& c) const { return run_calibrate_command(c); }
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
+  int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

@@ -33,7 +33,7 @@ Matrix6d parameter_jacobian(const Vector6d& parameters) {
 class ReprojectionCost final : public ceres::CostFunction {
  public:
   ReprojectionCost(const Shared& shared, const BundleView& view) : shared_(shared), view_(view) {
-    set_num_residuals(2 * static_cast<int>(view.corners_px.size()));
+    set_num_residuals(2 * static_cast<int>(view.points.size()));
     *mutable_parameter_block_sizes() = {6, 6, 6};
   }
 
@@ -44,12 +44,11 @@ class ReprojectionCost final : public ceres::CostFunction {
                                 perturb(view_.base_T_flange_said, at[2])};
     const std::array<Matrix6d, 3> inner = {parameter_jacobian(at[0]), parameter_jacobian(at[1]),
                                            parameter_jacobian(at[2])};
-    for (int i = 0; i < shared_.board.corners(); ++i) {
-      const auto index = static_cast<std::size_t>(i);
-      const auto term = corner_term(shared_.camera, geometry, shared_.board.corner(i));
+    for (std::size_t i = 0; i < view_.points.size(); ++i) {
+      const auto term = corner_term(shared_.camera, geometry, shared_.board.corner(view_.points.point(i)));
       if (!term) return false;
-      const double scale = std::sqrt(view_.weights[index]) / shared_.noise.corner_sigma_px;
-      Eigen::Map<Eigen::Vector2d>(residuals + 2 * i) = scale * (term->pixel - view_.corners_px[index]);
+      const double scale = std::sqrt(view_.weights[i]) / shared_.noise.corner_sigma_px;
+      Eigen::Map<Eigen::Vector2d>(residuals + 2 * i) = scale * (term->pixel - view_.points.corners_px[i]);
       if (jacobians == nullptr) continue;
       const std::array<const Eigen::Matrix<double, 2, 6>*, 3> outer = {&term->d_hand_eye, &term->d_board, &term->d_arm};
       for (std::size_t block = 0; block < outer.size(); ++block) {
@@ -146,12 +145,11 @@ Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera, const 
                                 perturb(views[v].base_T_flange_said, state.deviations[v])};
     ViewNormal normal;
     double squared = 0;
-    for (int i = 0; i < board.corners(); ++i) {
-      const auto index = static_cast<std::size_t>(i);
-      const auto term = corner_term(camera, geometry, board.corner(i));
+    for (std::size_t i = 0; i < views[v].points.size(); ++i) {
+      const auto term = corner_term(camera, geometry, board.corner(views[v].points.point(i)));
       if (!term) return failure(Fault::kSolveFailed, "view {}: a corner would be behind the camera", v + 1);
-      const Eigen::Vector2d residual = views[v].corners_px[index] - term->pixel;
-      const double weight = views[v].weights[index];
+      const Eigen::Vector2d residual = views[v].points.corners_px[i] - term->pixel;
+      const double weight = views[v].weights[i];
       normal.add(*term, residual, weight / (corner_sigma_px * corner_sigma_px));
       squared += weight * residual.squaredNorm();
       result.weighted_coordinates += 2 * weight;

@@ -12,8 +12,8 @@ namespace firstlook {
 /// One view as the bundle sees it.
 struct BundleView {
   Pose base_T_flange_said = Pose::Identity();
-  std::span<const Eigen::Vector2d> corners_px;
-  std::span<const double> weights;  ///< one for each corner, 0 to 1
+  SeenPoints points;
+  std::span<const double> weights;  ///< one for each point, 0 to 1
 };
 
 /// What is solved for.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "algorithms/vision/rotation.hpp"
+#include "algorithms/vision/target.hpp"
 #include "platform/core/transform.hpp"
 
 namespace firstlook {
@@ -12,10 +13,13 @@ namespace firstlook {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// One view of the board: where the arm said the flange was, and all corners of the board, row by row.
+/// One view of the board: where the arm said the flange was, and the board's points that the camera saw.
 struct CalibrationView {
   Transform<Base, Flange> base_T_flange;
   std::vector<Eigen::Vector2d> corners_px;
+  std::vector<int> ids{};  ///< the point that each of them is, ascending; empty: all points of the board, in order
+
+  [[nodiscard]] SeenPoints points() const { return {corners_px, ids}; }
 };
 
 /// One view reduced to two poses.

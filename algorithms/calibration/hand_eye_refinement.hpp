@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "algorithms/calibration/calibration_view.hpp"
-#include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 

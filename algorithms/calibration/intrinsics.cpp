@@ -15,9 +15,9 @@ IntrinsicsEstimate calibrate(int width, int height, const BoardSpec& board, std:
   for (const CalibrationView& view : views) {
     auto& object = objects.emplace_back();
     auto& image = images.emplace_back();
-    for (int i = 0; i < board.corners(); ++i) {
-      const Eigen::Vector3f p = board.corner(i).cast<float>();
-      const Eigen::Vector2f px = view.corners_px[static_cast<std::size_t>(i)].cast<float>();
+    for (std::size_t i = 0; i < view.corners_px.size(); ++i) {
+      const Eigen::Vector3f p = board.corner(point_of(view.ids, i)).cast<float>();
+      const Eigen::Vector2f px = view.corners_px[i].cast<float>();
       object.emplace_back(p.x(), p.y(), p.z());
       image.emplace_back(px.x(), px.y());
     }
@@ -50,9 +50,7 @@ Result<IntrinsicsEstimate> estimate_intrinsics(int width, int height, const Boar
     return failure(Fault::kTooFewViews, "{} views, the camera's intrinsics need {}", views.size(), kViewsMin);
   }
   for (const CalibrationView& view : views) {
-    if (view.corners_px.size() != static_cast<std::size_t>(board.corners())) {
-      return failure(Fault::kDataMalformed, "{} corners instead of {}", view.corners_px.size(), board.corners());
-    }
+    if (const Status fine = check_points(board, view.points()); !fine) return std::unexpected(fine.error());
   }
   try {
     cv::setNumThreads(1);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <numeric>
 
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/view_gate.hpp"
 #include "algorithms/vision/board_pose.hpp"
 #include "algorithms/vision/camera_model.hpp"
@@ -25,7 +26,7 @@ struct Validation {
   std::function<Result<Refinement>(const Indices&)> resolve;  ///< a short solve with some of them
   /// Sum of squared reprojection errors (px^2, both coordinates) of one view under a solution; empty without corners.
   std::function<double(std::size_t, const Refinement&)> squared_px;
-  double corners = 0;
+  std::vector<double> corners;  ///< seen in each of them
   Eigen::Vector3d board_center = Eigen::Vector3d::Zero();
 };
 
@@ -44,7 +45,7 @@ RefinementOptions short_options(const HandEyeOptions& options, const HandEyeResu
 void hold_out(const Validation& validation, HandEyeResult& result) {
   const std::size_t n = validation.pairs.size();
   const std::size_t groups = std::min<std::size_t>(5, n);
-  double squared_px = 0, squared_m = 0, views = 0;
+  double squared_px = 0, squared_m = 0, views = 0, corners = 0;
   for (std::size_t group = 0; group < groups; ++group) {
     Indices others;
     for (std::size_t i = 0; i < n; ++i) {
@@ -59,14 +60,15 @@ void hold_out(const Validation& validation, HandEyeResult& result) {
       if (validation.squared_px) {
         const double view_px = validation.squared_px(i, *solved);
         squared_px += view_px;
-        result.holdout_px[validation.given[i]] = std::sqrt(view_px / (2 * validation.corners));
+        result.holdout_px[validation.given[i]] = std::sqrt(view_px / (2 * validation.corners[i]));
+        corners += validation.corners[i];
       }
       views += 1;
     }
   }
   if (views == 0) return;
   result.holdout_rms_m = std::sqrt(squared_m / views);
-  if (validation.squared_px) result.holdout_rms_px = std::sqrt(squared_px / (2 * validation.corners * views));
+  if (validation.squared_px) result.holdout_rms_px = std::sqrt(squared_px / (2 * corners));
 }
 
 /// `count` of 0 .. n-1 without repetition, in ascending order.
@@ -175,7 +177,8 @@ HandEyeResult start_result(const Refinement& refinement, std::span<const PosePai
   return result;
 }
 
-/// Views and their pose pairs that `fits` calls used (all that show a board when it is empty).
+/// Views and their pose pairs that `fits` calls used (all that show a board when it is empty), the pairs settled among
+/// the poses that each picture allows.
 struct UsedViews {
   Indices given;
   std::vector<CalibrationView> views;
@@ -183,15 +186,21 @@ struct UsedViews {
 };
 
 UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
-                       std::span<const ViewFit> fits) {
+                       std::span<const ViewFit> fits,
+                       const std::optional<Transform<Flange, Camera>>& flange_T_camera = {}) {
   UsedViews used;
+  std::vector<OpenView> open;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i < fits.size() && !fits[i].used) continue;
-    const auto pose = estimate_board_pose_robust(camera, board, views[i].corners_px);
+    const auto pose = estimate_board_pose_robust(camera, board, views[i].points());
     if (!pose) continue;
     used.given.push_back(i);
     used.views.push_back(views[i]);
-    used.pairs.push_back({views[i].base_T_flange, pose->pose.camera_T_board});
+    open.push_back(seen_one_way(views[i], pose->pose));
+  }
+  const auto choices = flange_T_camera ? settle_choices(open, *flange_T_camera) : settle_choices(open);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    used.pairs.push_back({open[i].base_T_flange, open[i].choices[choices[i]].camera_T_board});
   }
   return used;
 }
@@ -201,10 +210,9 @@ double squared_error_px(const CameraIntrinsics& camera, const BoardSpec& board, 
   const auto camera_T_board = (view.base_T_flange * flange_T_camera).inverse() * base_T_board;
   constexpr double kNoImage_px = 1e4;
   double squared = 0;
-  for (int i = 0; i < board.corners(); ++i) {
-    const auto pixel = project(camera, camera_T_board * board.corner(i));
-    squared +=
-        pixel ? (*pixel - view.corners_px[static_cast<std::size_t>(i)]).squaredNorm() : kNoImage_px * kNoImage_px;
+  for (std::size_t i = 0; i < view.corners_px.size(); ++i) {
+    const auto pixel = project(camera, camera_T_board * board.corner(point_of(view.ids, i)));
+    squared += pixel ? (*pixel - view.corners_px[i]).squaredNorm() : kNoImage_px * kNoImage_px;
   }
   return squared;
 }
@@ -230,11 +238,12 @@ std::vector<std::string> covariance_reasons(const VerdictLimits& limits, const H
 
 double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
                         const Transform<Flange, Camera>& flange_T_camera, const Transform<Base, Board>& base_T_board) {
-  double squared = 0;
+  double squared = 0, corners = 0;
   for (const CalibrationView& view : views) {
+    corners += static_cast<double>(view.corners_px.size());
     squared += squared_error_px(camera, board, view, flange_T_camera, base_T_board);
   }
-  return views.empty() ? 0 : std::sqrt(squared / (2.0 * board.corners() * static_cast<double>(views.size())));
+  return corners == 0 ? 0 : std::sqrt(squared / (2 * corners));
 }
 
 Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
@@ -244,7 +253,8 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Board
   if (!start) return std::unexpected(start.error());
   const auto refinement = refine_hand_eye(camera, board, views, start->flange_T_camera, options.refinement);
   if (!refinement) return std::unexpected(refinement.error());
-  HandEyeResult result = start_result(*refinement, select_views(camera, board, views, refinement->views).pairs);
+  HandEyeResult result = start_result(
+      *refinement, select_views(camera, board, views, refinement->views, refinement->flange_T_camera).pairs);
   result.closed_form = start->flange_T_camera;
   result.closed_form_raw = start->raw_flange_T_camera;
   return result;
@@ -252,14 +262,16 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Board
 
 void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result) {
-  const UsedViews used = select_views(camera, board, views, result.fits);
+  const UsedViews used = select_views(camera, board, views, result.fits, result.flange_T_camera);
   const RefinementOptions quick = short_options(options, result);
   Validation validation;
   validation.pairs = used.pairs;
   validation.given = used.given;
   validation.views_given = views.size();
   validation.board_center = board.center();
-  validation.corners = board.corners();
+  for (const CalibrationView& view : used.views) {
+    validation.corners.push_back(static_cast<double>(view.corners_px.size()));
+  }
   validation.resolve = [&](const Indices& indices) {
     std::vector<CalibrationView> some;
     for (const std::size_t i : indices) some.push_back(used.views[i]);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/chi_square.hpp"
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
 #include "algorithms/calibration/verdict.hpp"
@@ -102,10 +103,13 @@ CommonBoard fit_board(const std::vector<BoardReading>& readings, const Eigen::Ma
 }
 
 /// Noise of a corner, from what is left when each view has its own pose of the board (six parameters).
-double shown_corner_sigma(std::span<const SeenView> seen, const BoardSpec& board) {
-  const double coordinates = 2.0 * board.corners();
-  double squared_px = 0;
-  for (const SeenView& s : seen) squared_px += s.pose.residual_rms_px * s.pose.residual_rms_px;
+double shown_corner_sigma(std::span<const SeenView> seen) {
+  double squared_px = 0, corners = 0;
+  for (const SeenView& s : seen) {
+    squared_px += s.pose.residual_rms_px * s.pose.residual_rms_px;
+    corners += static_cast<double>(s.view->corners_px.size());
+  }
+  const double coordinates = 2 * corners / static_cast<double>(seen.size());
   return std::sqrt(squared_px / static_cast<double>(seen.size()) * coordinates / (coordinates - 6));
 }
 
@@ -167,6 +171,23 @@ double largest_deviation(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()(2)));
 }
 
+/// The views that show a board, each with the one of its poses that agrees with the others.
+std::vector<SeenView> settled_views(const CameraIntrinsics& camera, const BoardSpec& board,
+                                    std::span<const CalibrationView> views,
+                                    const Transform<Flange, Camera>& flange_T_camera) {
+  std::vector<SeenView> seen;
+  std::vector<OpenView> open;
+  for (const CalibrationView& view : views) {
+    const auto pose = estimate_board_pose_robust(camera, board, view.points());
+    if (!pose) continue;
+    seen.push_back({&view, pose->pose});
+    open.push_back(seen_one_way(view, pose->pose));
+  }
+  const auto choices = settle_choices(open, flange_T_camera);
+  for (std::size_t i = 0; i < seen.size(); ++i) adopt_choice(board, open[i].choices[choices[i]], seen[i].pose);
+  return seen;
+}
+
 }  // namespace
 
 DetectableError detectable_error(const Matrix6d& views_covariance, const Matrix6d& claim_covariance, int views,
@@ -182,17 +203,13 @@ DetectableError detectable_error(const Matrix6d& views_covariance, const Matrix6
 Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
                                      std::span<const CalibrationView> views, const HandEyeClaim& stated,
                                      const VerificationLimits& limits) {
-  std::vector<SeenView> seen;
-  for (const CalibrationView& view : views) {
-    const auto pose = estimate_board_pose_robust(camera, board, view.corners_px);
-    if (pose) seen.push_back({&view, pose->pose});
-  }
+  const std::vector<SeenView> seen = settled_views(camera, board, views, stated.flange_T_camera);
   const auto count = static_cast<int>(seen.size());
   if (count < std::max(2, limits.views_min)) {
     return failure(Fault::kTooFewViews, "{} usable views of the board, {} are the least", count, limits.views_min);
   }
   HandEyeClaim claim = stated;
-  claim.corner_sigma_px = std::max(stated.corner_sigma_px, shown_corner_sigma(seen, board));
+  claim.corner_sigma_px = std::max(stated.corner_sigma_px, shown_corner_sigma(seen));
   std::vector<BoardReading> readings;
   for (const SeenView& s : seen) readings.push_back(read_board(s, claim));
   const CommonBoard common = fit_board(readings, joint_information(readings, claim.covariance));

@@ -13,21 +13,15 @@ namespace {
 /// Smallest distance between an outer corner and its two neighbours; negative when a corner lies outside the margin.
 double smallest_spacing_px(const ViewDesignModel& model, const Transform<Camera, Board>& camera_T_board,
                            double margin_px) {
-  const int columns = model.board.inner_columns, rows = model.board.inner_rows;
-  const auto pixel = [&](int column, int row) {
-    return project(model.camera, camera_T_board * model.board.corner(row * columns + column));
-  };
+  const auto pixel = [&](int corner) { return project(model.camera, camera_T_board * model.board.corner(corner)); };
   double smallest = std::numeric_limits<double>::infinity();
-  for (const int column : {0, columns - 1}) {
-    for (const int row : {0, rows - 1}) {
-      const auto here = pixel(column, row);
-      const auto beside = pixel(column == 0 ? 1 : columns - 2, row);
-      const auto below = pixel(column, row == 0 ? 1 : rows - 2);
-      if (!here || !beside || !below || !in_image(model.camera, *here, margin_px)) return -1;
-      smallest = std::min({smallest, (*here - *beside).norm(), (*here - *below).norm()});
-    }
+  for (const int corner : model.board.outer_corners()) {
+    const auto [along_row, along_column] = model.board.neighbours_of_outer(corner);
+    const auto here = pixel(corner), beside = pixel(along_row), below = pixel(along_column);
+    if (!here || !beside || !below || !in_image(model.camera, *here, margin_px)) return -1;
+    smallest = std::min({smallest, (*here - *beside).norm(), (*here - *below).norm()});
   }
-  return smallest;
+  return smallest / model.board.detail_ratio();
 }
 
 }  // namespace

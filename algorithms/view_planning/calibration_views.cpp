@@ -119,9 +119,7 @@ PredictedSigma predicted_sigma(const Matrix6d& covariance) {
 bool hides_board(const ViewDesignModel& model, const Capsules& body_in_base,
                  const Transform<Base, Flange>& base_T_flange) {
   const Eigen::Vector3d eye = (base_T_flange * model.flange_T_camera).translation();
-  const int columns = model.board.inner_columns;
-  const int last = model.board.corners() - 1;
-  for (const int corner : {0, columns - 1, last - columns + 1, last}) {
+  for (const int corner : model.board.outer_corners()) {
     const Eigen::Vector3d point = model.base_T_board * model.board.corner(corner);
     for (const Capsule& c : body_in_base) {
       if (segment_distance_m(eye, eye, c.a, c.b) <= c.radius_m) continue;

@@ -28,21 +28,22 @@ struct Normal {
 struct Problem {
   const CameraIntrinsics& camera;
   const BoardSpec& board;
-  std::span<const Eigen::Vector2d> corners_px;
-  std::span<const double> weights;  ///< one for each corner
+  SeenPoints points;
+  std::span<const double> weights;  ///< one for each point
+  [[nodiscard]] Eigen::Vector3d on_board(std::size_t i) const { return board.corner(points.point(i)); }
 };
 
 /// Normal equations at a pose; empty when a corner has no image from there.
 std::optional<Normal> linearize(const Problem& problem, const Pose& pose) {
   Normal n;
-  for (int i = 0; i < problem.board.corners(); ++i) {
-    const Eigen::Vector3d turned = pose.linear() * problem.board.corner(i);
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const Eigen::Vector3d turned = pose.linear() * problem.on_board(i);
     const auto projected = project_with_jacobian(problem.camera, turned + pose.translation());
     if (!projected) return std::nullopt;
-    const Eigen::Vector2d residual = problem.corners_px[static_cast<std::size_t>(i)] - projected->pixel;
+    const Eigen::Vector2d residual = problem.points.corners_px[i] - projected->pixel;
     Eigen::Matrix<double, 2, 6> j;
     j << projected->d_pixel_d_point, -projected->d_pixel_d_point * cross_matrix(turned);
-    const double weight = problem.weights[static_cast<std::size_t>(i)];
+    const double weight = problem.weights[i];
     n.jtj += weight * j.transpose() * j;
     n.jtr += weight * j.transpose() * residual;
     n.cost += weight * residual.squaredNorm();
@@ -99,29 +100,30 @@ std::optional<Pose> pose_from_homography(const Eigen::Matrix3d& h) {
   return pose;
 }
 
-/// The other pose of a plane that looks nearly the same: its normal mirrored at the line of sight (Schweighofer and
-/// Pinz 2006), its centre kept.
-Pose mirrored(const Pose& pose, const Eigen::Vector3d& center_in_board) {
-  const Eigen::Vector3d center = pose * center_in_board;
-  const Eigen::Vector3d sight = center.normalized();
-  const Eigen::Vector3d normal = pose.linear().col(2);
-  const Eigen::Vector3d other = 2 * normal.dot(sight) * sight - normal;
-  Pose result = Pose::Identity();
-  result.linear() = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix() * pose.linear();
-  result.translation() = center - result.linear() * center_in_board;
-  return result;
-}
-
 std::optional<Pose> start_pose(const Problem& problem) {
   std::vector<Eigen::Vector2d> plane, normalized;
-  for (int i = 0; i < problem.board.corners(); ++i) {
-    const auto point = undistort(problem.camera, problem.corners_px[static_cast<std::size_t>(i)]);
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const auto point = undistort(problem.camera, problem.points.corners_px[i]);
     if (!point) return std::nullopt;
-    plane.push_back(problem.board.corner(i).head<2>());
+    plane.push_back(problem.on_board(i).head<2>());
     normalized.push_back(*point);
   }
   const auto h = fit_homography(plane, normalized);
   return h ? pose_from_homography(*h) : std::nullopt;
+}
+
+/// The middle of the points that are seen.
+Eigen::Vector3d middle_of(const Problem& problem) {
+  if (problem.points.ids.empty()) return problem.board.center();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < problem.points.size(); ++i) sum += problem.on_board(i);
+  return sum / static_cast<double>(problem.points.size());
+}
+
+/// False when both refinements ended in the same pose.
+bool is_another(const Refined& a, const Refined& b) {
+  constexpr double kApart_rad = 1e-3;
+  return rotation_log(a.pose.linear() * b.pose.linear().transpose()).norm() > kApart_rad;
 }
 
 /// `coordinates` that the cost is summed over.
@@ -135,14 +137,13 @@ BoardPose to_board_pose(const Refined& refined, double coordinates) {
   return result;
 }
 
-std::vector<double> corner_residuals(const CameraIntrinsics& camera, const BoardSpec& board,
-                                     std::span<const Eigen::Vector2d> corners_px,
+std::vector<double> corner_residuals(const CameraIntrinsics& camera, const BoardSpec& board, const SeenPoints& points,
                                      const Transform<Camera, Board>& camera_T_board) {
   constexpr double kNoImage_px = 1e9;
   std::vector<double> lengths;
-  for (int i = 0; i < board.corners(); ++i) {
-    const auto pixel = project(camera, camera_T_board * board.corner(i));
-    lengths.push_back(pixel ? (corners_px[static_cast<std::size_t>(i)] - *pixel).norm() : kNoImage_px);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto pixel = project(camera, camera_T_board * board.corner(points.point(i)));
+    lengths.push_back(pixel ? (points.corners_px[i] - *pixel).norm() : kNoImage_px);
   }
   return lengths;
 }
@@ -164,23 +165,39 @@ std::vector<double> huber_weights(const std::vector<double>& lengths_px, double 
 
 }  // namespace
 
-Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board,
-                                      std::span<const Eigen::Vector2d> corners_px, double residual_max_px) {
+Pose mirrored_pose(const Pose& pose, const Eigen::Vector3d& center_in_board) {
+  const Eigen::Vector3d center = pose * center_in_board;
+  const Eigen::Vector3d sight = center.normalized();
+  const Eigen::Vector3d normal = pose.linear().col(2);
+  const Eigen::Vector3d other = 2 * normal.dot(sight) * sight - normal;
+  Pose result = Pose::Identity();
+  result.linear() = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix() * pose.linear();
+  result.translation() = center - result.linear() * center_in_board;
+  return result;
+}
+
+Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const BoardSpec& board, const SeenPoints& points,
+                                      double residual_max_px) {
   if (const Status fine = check_board(board); !fine) return std::unexpected(fine.error());
   if (!is_usable(camera)) return failure(Fault::kConfigBadValue, "camera intrinsics are not usable");
-  if (corners_px.size() != static_cast<std::size_t>(board.corners())) {
-    return failure(Fault::kBoardNotFound, "{} corners instead of {}", corners_px.size(), board.corners());
+  if (const Status fine = check_points(board, points); !fine) {
+    return failure(Fault::kBoardNotFound, "{}", fine.error().detail());
   }
-  const std::vector<double> weights(corners_px.size(), 1.0);
-  const Problem problem{camera, board, corners_px, weights};
+  const std::vector<double> weights(points.size(), 1.0);
+  const Problem problem{camera, board, points, weights};
   const auto start = start_pose(problem);
   if (!start) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
   std::optional<Refined> best = refine(problem, *start);
-  const auto other = refine(problem, mirrored(best ? best->pose : *start, board.center()));
-  if (other && (!best || other->normal.cost < best->normal.cost)) best = other;
+  std::optional<Refined> other = refine(problem, mirrored_pose(best ? best->pose : *start, middle_of(problem)));
+  if (other && (!best || other->normal.cost < best->normal.cost)) std::swap(best, other);
   if (!best) return failure(Fault::kBoardNotFound, "the corners are not a board's image");
 
-  BoardPose result = to_board_pose(*best, 2.0 * board.corners());
+  const double coordinates = 2.0 * static_cast<double>(points.size());
+  BoardPose result = to_board_pose(*best, coordinates);
+  if (other && is_another(*best, *other)) {
+    const BoardPose second = to_board_pose(*other, coordinates);
+    result.other = {second.camera_T_board, second.residual_rms_px, second.unit_covariance};
+  }
   if (!(result.residual_rms_px <= residual_max_px)) {
     return failure(Fault::kBoardNotFound, "corners off by {:.2f} px RMS from any pose of the board",
                    result.residual_rms_px);
@@ -189,20 +206,21 @@ Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const Boar
 }
 
 Result<RobustBoardPose> estimate_board_pose_robust(const CameraIntrinsics& camera, const BoardSpec& board,
-                                                   std::span<const Eigen::Vector2d> corners_px, double residual_max_px,
-                                                   double loss_scale, double sigma_min_px) {
+                                                   const SeenPoints& points, double residual_max_px, double loss_scale,
+                                                   double sigma_min_px) {
   constexpr int kRounds = 4;
-  const auto plain = estimate_board_pose(camera, board, corners_px, residual_max_px);
+  const auto plain = estimate_board_pose(camera, board, points, residual_max_px);
   if (!plain) return std::unexpected(plain.error());
-  RobustBoardPose robust{*plain, corner_residuals(camera, board, corners_px, plain->camera_T_board), {}};
+  RobustBoardPose robust{*plain, corner_residuals(camera, board, points, plain->camera_T_board), {}};
   for (int round = 0; round < kRounds; ++round) {
     robust.weights = huber_weights(robust.residuals_px, loss_scale, sigma_min_px);
     const double total = std::accumulate(robust.weights.begin(), robust.weights.end(), 0.0);
     if (total == static_cast<double>(robust.weights.size())) break;
-    const auto refined = refine({camera, board, corners_px, robust.weights}, robust.pose.camera_T_board.pose());
+    const auto refined = refine({camera, board, points, robust.weights}, robust.pose.camera_T_board.pose());
     if (!refined) return failure(Fault::kBoardNotFound, "too many corners contradict each other");
     robust.pose = to_board_pose(*refined, 2 * total);
-    robust.residuals_px = corner_residuals(camera, board, corners_px, robust.pose.camera_T_board);
+    robust.pose.other = plain->other;
+    robust.residuals_px = corner_residuals(camera, board, points, robust.pose.camera_T_board);
   }
   return robust;
 }

@@ -1,12 +1,13 @@
-/// The adapter to OpenCV's classic checkerboard search and corner refinement: its types and exceptions end here.
+/// The adapter to OpenCV's resizing and corner refinement: its types and exceptions end here.
 #include "algorithms/vision/checkerboard.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "algorithms/vision/checkerboard_lattice.hpp"
+#include "algorithms/vision/corner_refinement.hpp"
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/saddle_points.hpp"
 
@@ -35,12 +36,22 @@ double smallest_spacing_px(const Grid& g) {
   return smallest;
 }
 
-/// Largest distance of a corner from the middle of its two neighbours in a row or column, in their spacings.
-/// Perspective and lens distortion bend little over three corners; a wrong corner stands out.
-double largest_local_residual(const Grid& g) {
-  double largest = 0;
+/// How far corners lie from the middle of their two neighbours in a row or column. Perspective and lens distortion bend
+/// little over three corners, and all of a board alike; a wrong corner stands out.
+struct LocalResiduals {
+  double largest_spacings = 0;
+  double largest_px = 0;
+  double median_px = 0;
+};
+
+LocalResiduals local_residuals(const Grid& g) {
+  LocalResiduals result;
+  std::vector<double> all_px;
   const auto check = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
-    largest = std::max(largest, ((a + c) / 2 - b).norm() / std::max(1e-9, (c - a).norm() / 2));
+    const double off_px = ((a + c) / 2 - b).norm();
+    all_px.push_back(off_px);
+    result.largest_px = std::max(result.largest_px, off_px);
+    result.largest_spacings = std::max(result.largest_spacings, off_px / std::max(1e-9, (c - a).norm() / 2));
   };
   for (int row = 0; row < g.board.inner_rows; ++row) {
     for (int column = 0; column < g.board.inner_columns; ++column) {
@@ -48,60 +59,46 @@ double largest_local_residual(const Grid& g) {
       if (row > 1) check(g.at(column, row - 2), g.at(column, row - 1), g.at(column, row));
     }
   }
-  return largest;
+  const auto middle = all_px.begin() + static_cast<std::ptrdiff_t>(all_px.size() / 2);
+  std::nth_element(all_px.begin(), middle, all_px.end());
+  result.median_px = *middle;
+  return result;
 }
 
-/// OpenCV's search in one picture. No fast check: it misses visible boards (thesis, table D-8). No histogram
-/// equalisation: it finds no more boards and turns the noise of a plain wall into seconds of work.
-Corners search(const cv::Mat& picture, const BoardSpec& board) {
-  std::vector<cv::Point2f> found;
-  const cv::Size size(board.inner_columns, board.inner_rows);
-  if (!cv::findChessboardCorners(picture, size, found, cv::CALIB_CB_ADAPTIVE_THRESH)) return {};
-  if (found.size() != static_cast<std::size_t>(board.corners())) return {};
-  Corners corners;
-  for (const cv::Point2f& p : found) corners.emplace_back(p.x, p.y);
-  return corners;
-}
-
-/// Where corner-like points stand together in a small part of the picture, that part at twice the size: finds small
-/// boards that the whole picture's search misses, and costs little.
-Corners search_close_up(const cv::Mat& picture, const BoardSpec& board, const SaddlePoints& saddles) {
-  const int margin = std::max(saddles.right - saddles.left, saddles.bottom - saddles.top) / 3 + 8;
-  const cv::Rect around(saddles.left - margin, saddles.top - margin, saddles.right - saddles.left + 2 * margin,
-                        saddles.bottom - saddles.top + 2 * margin);
-  const cv::Rect part = around & cv::Rect(0, 0, picture.cols, picture.rows);
-  if (part.area() * 3 > picture.cols * picture.rows) return {};
-  cv::Mat large;
-  cv::resize(picture(part), large, cv::Size(), 2, 2, cv::INTER_LINEAR);
-  Corners corners = search(large, board);
-  for (Eigen::Vector2d& p : corners) {
-    p = ((p.array() + 0.5) / 2 - 0.5).matrix() + Eigen::Vector2d(part.x, part.y);
-  }
-  return corners;
+cv::Mat smoothed(const cv::Mat& image) {
+  cv::Mat result;
+  cv::GaussianBlur(image, result, cv::Size(5, 5), 1.0);
+  return result;
 }
 
 /// The search in the picture scaled to `scale`; corners in full-size pixels.
 Corners search_scaled(const cv::Mat& image, const BoardSpec& board, double scale) {
   cv::Mat scaled = image;
   if (scale < 1) cv::resize(image, scaled, cv::Size(), scale, scale, cv::INTER_AREA);
-  const SaddlePoints saddles = find_saddle_points({scaled.data, scaled.cols, scaled.rows});
-  if (saddles.count < saddle_points_min(board.corners())) return {};
-  // More than one in a hundred pixels is noise, not a scene; searching it would take seconds.
-  if (saddles.count > scaled.cols * scaled.rows / 100) return {};
-  Corners corners = search_close_up(scaled, board, saddles);
-  if (corners.empty()) corners = search(scaled, board);
+  const GrayImage picture{scaled.data, scaled.cols, scaled.rows};
+  // More saddle points than one in a hundred pixels are noise, not a scene.
+  const int saddles_max = scaled.cols * scaled.rows / 100;
+  const auto search = [&](const SaddlePoints& saddles) -> Corners {
+    if (saddles.count < saddle_points_min(board.corners()) || saddles.count > saddles_max) return {};
+    return find_checkerboard_lattice(picture, saddles, board).corners_px;
+  };
+  Corners corners = search(find_saddle_points_full(picture));
+  if (corners.empty()) corners = search(find_saddle_points_halved(picture));
+  if (corners.empty()) {  // a small board in noise: its corners are too near for half the size
+    const cv::Mat quiet = smoothed(scaled);
+    corners = search(find_saddle_points_full({quiet.data, quiet.cols, quiet.rows}));
+  }
   for (Eigen::Vector2d& p : corners) p = ((p.array() + 0.5) / scale - 0.5).matrix();
   return corners;
 }
 
-void refine(const cv::Mat& image, const BoardSpec& board, double window_of_spacing, Corners& corners) {
+void refine(const cv::Mat& image, const BoardSpec& board, const DetectionOptions& options, Corners& corners) {
   const double spacing = smallest_spacing_px({board, corners});
-  const int half = std::clamp(static_cast<int>(std::lround(window_of_spacing * spacing)), 2, 40);
-  std::vector<cv::Point2f> points;
-  for (const auto& p : corners) points.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
-  cv::cornerSubPix(image, points, cv::Size(half, half), cv::Size(-1, -1),
-                   cv::TermCriteria(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 40, 0.001));
-  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = {points[i].x, points[i].y};
+  int half = std::clamp(static_cast<int>(std::lround(options.window_of_spacing * spacing)), 2, 40);
+  if (options.fixed_half_window_px > 0) half = options.fixed_half_window_px;
+  half = std::min(half, (std::min(image.cols, image.rows) - 6) / 2);  // OpenCV asks for a larger image
+  refine_corners({image.data, image.cols, image.rows},
+                 {half, options.refinement_iterations, options.refinement_step_px}, corners);
 }
 
 /// Board coordinates in squares -> pixels.
@@ -167,13 +164,18 @@ Result<CornerSet> check_corners(const cv::Mat& image, const BoardSpec& board, co
   if (std::abs(first_square_darkness(image, grid)) < kContrastMin) {
     return failure(Fault::kBoardNotFound, "the squares have no contrast");
   }
-  const double local = largest_local_residual(grid);
-  if (!(local <= options.local_residual_max)) {
-    return failure(Fault::kBoardNotFound, "a corner lies {:.2f} squares off its neighbours", local);
+  const LocalResiduals local = local_residuals(grid);
+  if (!(local.largest_spacings <= options.local_residual_max)) {
+    return failure(Fault::kBoardNotFound, "a corner lies {:.2f} squares off its neighbours", local.largest_spacings);
+  }
+  constexpr double kMediansMax = 12, kSlack_px = 2;  // four at most on tilted boards in a lens as the thesis's
+  if (local.largest_px > kMediansMax * local.median_px + kSlack_px) {
+    return failure(Fault::kBoardNotFound, "a corner lies {:.1f} px off its neighbours, the others {:.1f} px",
+                   local.largest_px, local.median_px);
   }
   const auto h = board_homography(board, corners);
   if (!h) return failure(Fault::kBoardNotFound, "the corners do not span a plane");
-  CornerSet set{corners, 0};
+  CornerSet set{corners, 0, {}};
   for (int i = 0; i < board.corners(); ++i) {
     const Eigen::Vector2d square(i % board.inner_columns, i / board.inner_columns);
     set.residual_rms_px +=
@@ -193,30 +195,22 @@ Result<CornerSet> detect(const cv::Mat& image, const BoardSpec& board, const Det
   }
   if (corners.empty())
     return failure(Fault::kBoardNotFound, "no {}x{} board seen whole", board.inner_columns, board.inner_rows);
-  refine(image, board, options.window_of_spacing, corners);
   make_unique(image, board, corners);
-  return check_corners(image, board, options, corners);
+  Corners refined = corners;
+  refine(image, board, options, refined);
+  auto result = check_corners(image, board, options, refined);
+  if (result) return result;
+  // Small windows in strong noise send a corner astray: once more in a quieter picture.
+  refined = corners;
+  refine(smoothed(image), board, options, refined);
+  return check_corners(image, board, options, refined);
 }
 
 }  // namespace
 
-Status check_board(const BoardSpec& board) {
-  if (board.inner_columns < 3 || board.inner_rows < 3 || board.inner_columns > kBoardCornersMax ||
-      board.inner_rows > kBoardCornersMax || board.corners() > kBoardCornersMax) {
-    return failure(Fault::kConfigBadValue, "a board of {}x{} inner corners: 3 at least each way, {} at most in all",
-                   board.inner_columns, board.inner_rows, kBoardCornersMax);
-  }
-  if (!(board.square_size_m > 0 && board.square_size_m <= 10)) {
-    return failure(Fault::kConfigBadValue, "a board with squares of {} m", board.square_size_m);
-  }
-  return {};
-}
-
 Result<CornerSet> detect_checkerboard(GrayImage image, const BoardSpec& board, const DetectionOptions& options) {
   if (const Status fine = check_board(board); !fine) return std::unexpected(fine.error());
-  if (image.data == nullptr || image.width < 32 || image.height < 32 || image.width > 8192 || image.height > 8192) {
-    return failure(Fault::kDataMalformed, "an image of {}x{} pixels", image.width, image.height);
-  }
+  if (const Status fine = check_image(image); !fine) return std::unexpected(fine.error());
   try {
     cv::setNumThreads(1);  // results and memory must not depend on the number of cores
     // OpenCV has no read-only header for foreign pixels; nothing below writes to it.
@@ -227,40 +221,6 @@ Result<CornerSet> detect_checkerboard(GrayImage image, const BoardSpec& board, c
   } catch (const std::bad_alloc&) {
     return failure(Fault::kOutOfMemory, "searching the board in {}x{} pixels", image.width, image.height);
   }
-}
-
-Result<CornerSet> average_corners(std::span<const CornerSet> frames, double agreement_max_px) {
-  if (frames.empty()) return failure(Fault::kBoardNotFound, "no frame");
-  const std::size_t count = frames[0].corners_px.size();
-  for (const CornerSet& frame : frames) {
-    if (frame.corners_px.size() != count) return failure(Fault::kBoardNotFound, "frames with different boards");
-  }
-  Corners median(count);
-  std::vector<double> values(frames.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    for (int axis = 0; axis < 2; ++axis) {
-      for (std::size_t f = 0; f < frames.size(); ++f) values[f] = frames[f].corners_px[i][axis];
-      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-      median[i][axis] = values[values.size() / 2];
-    }
-  }
-  CornerSet mean{Corners(count, Eigen::Vector2d::Zero()), 0};
-  std::size_t agreeing = 0;
-  for (const CornerSet& frame : frames) {
-    double distance2 = 0;
-    for (std::size_t i = 0; i < count; ++i) distance2 += (frame.corners_px[i] - median[i]).squaredNorm();
-    if (!(distance2 <= agreement_max_px * agreement_max_px * static_cast<double>(count))) continue;
-    for (std::size_t i = 0; i < count; ++i) mean.corners_px[i] += frame.corners_px[i];
-    mean.residual_rms_px += frame.residual_rms_px;
-    ++agreeing;
-  }
-  if (agreeing * 2 < frames.size() || agreeing == 0) {
-    return failure(Fault::kBoardNotFound, "only {} of {} frames agree: the arm or the board moves", agreeing,
-                   frames.size());
-  }
-  for (Eigen::Vector2d& p : mean.corners_px) p /= static_cast<double>(agreeing);
-  mean.residual_rms_px /= static_cast<double>(agreeing);
-  return mean;
 }
 
 }  // namespace firstlook

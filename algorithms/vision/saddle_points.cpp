@@ -58,6 +58,14 @@ void saddle_response(const Picture& p, int v, std::vector<float>& out) {
   }
 }
 
+SaddlePoint saddle_at(const Picture& p, int u, int v) {
+  SaddlePoint s{static_cast<float>(u), static_cast<float>(v)};
+  s.xx = static_cast<float>(p.at(u - 2, v) + p.at(u + 2, v) - 2 * p.at(u, v));
+  s.yy = static_cast<float>(p.at(u, v - 2) + p.at(u, v + 2) - 2 * p.at(u, v));
+  s.xy = static_cast<float>(p.at(u - 2, v - 2) + p.at(u + 2, v + 2) - p.at(u + 2, v - 2) - p.at(u - 2, v + 2)) / 4;
+  return s;
+}
+
 /// Black and white alternate exactly four times on a ring around the point (Bennett and Lasenby 2014 in idea).
 bool alternates(const Picture& p, int u, int v) {
   constexpr int kReach = 4;
@@ -110,6 +118,7 @@ SaddlePoints find_at_this_size(GrayImage image) {
   saddle_response(p, 2, rows[1]);
   saddle_response(p, 3, rows[2]);
   std::vector<int> columns, lines;
+  SaddlePoints points;
   for (int v = 3; v + 3 < p.height; ++v) {
     std::rotate(rows.begin(), rows.begin() + 1, rows.end());
     saddle_response(p, v + 1, rows[2]);
@@ -122,10 +131,11 @@ SaddlePoints find_at_this_size(GrayImage image) {
       if (here > before && here >= after && alternates(p, static_cast<int>(u), v)) {
         columns.push_back(static_cast<int>(u));
         lines.push_back(v);
+        points.points.push_back(saddle_at(p, static_cast<int>(u), v));
       }
     }
   }
-  SaddlePoints points{static_cast<int>(columns.size())};
+  points.count = static_cast<int>(columns.size());
   if (columns.empty()) return points;
   const auto [left, right] = percentiles(columns);
   const auto [top, bottom] = percentiles(lines);
@@ -138,12 +148,21 @@ SaddlePoints find_at_this_size(GrayImage image) {
 
 }  // namespace
 
+SaddlePoints find_saddle_points_full(GrayImage image) { return find_at_this_size(image); }
+
+SaddlePoints find_saddle_points_halved(GrayImage image) {
+  const std::vector<std::uint8_t> pixels = halved(image);
+  SaddlePoints found = find_at_this_size({pixels.data(), image.width / 2, image.height / 2});
+  found.left *= 2, found.top *= 2, found.right *= 2, found.bottom *= 2;
+  // The middle of a pixel of the half-size picture lies between two of the full one.
+  for (SaddlePoint& s : found.points) s.u = 2 * s.u + 0.5F, s.v = 2 * s.v + 0.5F;
+  return found;
+}
+
 SaddlePoints find_saddle_points(GrayImage image) {
   const SaddlePoints full = find_at_this_size(image);
-  const std::vector<std::uint8_t> pixels = halved(image);
-  const SaddlePoints half = find_at_this_size({pixels.data(), image.width / 2, image.height / 2});
-  if (full.count >= half.count) return full;
-  return {half.count, 2 * half.left, 2 * half.top, 2 * half.right, 2 * half.bottom};
+  SaddlePoints half = find_saddle_points_halved(image);
+  return full.count >= half.count ? full : half;
 }
 
 }  // namespace firstlook

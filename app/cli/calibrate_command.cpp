@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "algorithms/vision/detector_presets.hpp"
+#include "algorithms/vision/target_names.hpp"
 #include "app/dataset/calibration_dataset.hpp"
 #include "app/report/hand_eye_json.hpp"
 #include "app/report/ros_files.hpp"
@@ -25,8 +27,7 @@ void narrate(const CalibrationDataset& data) {
   if (data.source == CalibrationSource::kPairs) {
     fmt::print(stderr, "{} pose pairs\n", data.pairs.size());
   } else {
-    fmt::print(stderr, "{} views of a board of {}x{} inner corners, {:.2f} mm squares, {}\n", data.views.size(),
-               data.board.inner_columns, data.board.inner_rows, data.board.square_size_m * 1e3,
+    fmt::print(stderr, "{} views of a board: {}; {}\n", data.views.size(), describe(data.board),
                data.source == CalibrationSource::kImages ? "corners found in the images" : "corners as given");
   }
 }
@@ -92,7 +93,12 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
     fmt::print(stderr, "no dataset named: firstlook calibrate --dataset DIR\n");
     return kUsageError;
   }
-  const auto data = read_calibration_dataset(options.dataset);
+  const auto preset = find_detector_preset(options.detector);
+  if (!preset) {
+    fmt::print(stderr, "unknown detector '{}': {}\n", options.detector, fmt::join(detector_preset_names(), ", "));
+    return kUsageError;
+  }
+  const auto data = read_calibration_dataset(options.dataset, preset->detection);
   if (!data) return fail(data.error(), kDataError);
   narrate(*data);
   const auto result = data->source == CalibrationSource::kPairs

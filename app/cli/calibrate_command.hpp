@@ -10,6 +10,7 @@ struct CalibrateCommandOptions {
   std::string solver;   ///< a name of solver_table(); empty: park-martin
   bool strict = false;  ///< a rejected calibration is an error
   bool json = false;
+  std::string detector = "default";  ///< find_detector_preset
 };
 
 /// Prints the result on stdout (the hand_eye object of result.json when asked) and narrates on stderr.

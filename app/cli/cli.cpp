@@ -76,6 +76,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   calibrate_app->add_option(
       "--solver", calibrate.solver,
       fmt::format("what starts the refinement (park-martin): {}", fmt::join(solver_names(), ", ")));
+  calibrate_app->add_option("--detector", calibrate.detector,
+                            "settings of the checkerboard's detection: default, thesis2014 (table D-8), ...")
+      ->capture_default_str();
   calibrate_app->add_flag("--strict", calibrate.strict, "exit with 5 when the calibration is rejected");
   calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");
 
@@ -87,6 +90,30 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   map_app->add_option("--max-range", map.range_max_m, "rays are cut here, metres")->capture_default_str();
   map_app->add_option("--out", map_out, "folder for collision_map.bt, map.ot and map.ply");
   map_app->add_flag("--json", map.json, "print the counts as JSON");
+
+  BoardCommandOptions board;
+  CLI::App* board_app = app.add_subcommand("board", "a printable target at true size");
+  const auto types = target_type_names(), dictionaries = dictionary_names();
+  board_app->add_option("--type", board.words.type, "kind of target")
+      ->required()
+      ->check(CLI::IsMember(std::vector<std::string>(types.begin(), types.end())));
+  board_app->add_option("--columns", board.words.columns, "inner corners, circles or markers along a row")
+      ->capture_default_str();
+  board_app->add_option("--rows", board.words.rows, "the same along a column")->capture_default_str();
+  board_app
+      ->add_option("--size", board.words.spacing_m,
+                   "metres from neighbour to neighbour: side of a square, or of a single marker")
+      ->capture_default_str();
+  board_app->add_option("--mark-size", board.words.mark_size_m,
+                        "side of a marker or diameter of a circle, metres (default: usual part of --size)");
+  board_app->add_option("--dictionary", board.words.dictionary, "family of the markers")
+      ->check(CLI::IsMember(std::vector<std::string>(dictionaries.begin(), dictionaries.end())))
+      ->capture_default_str();
+  board_app->add_option("--first-id", board.words.first_id, "number of the first marker")->capture_default_str();
+  board_app->add_flag("--legacy", board.words.legacy, "ChArUco as OpenCV drew it before 4.6");
+  board_app->add_option("--page", board.page,
+                        "A4, A3, letter, or WIDTHxHEIGHT in mm (default: the smallest that fits)");
+  board_app->add_option("-o,--out", board.out, "file to write")->capture_default_str();
 
   ReplayCommand replay;
   CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
@@ -131,6 +158,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
     map.out = map_out;
     return {map, 0};
   }
+  if (board_app->parsed()) return {board, 0};
   if (replay_app->parsed()) return {replay, 0};
   if (states_app->parsed()) return {StatesCommand{}, 0};
   if (explain_app->parsed()) return {explain, 0};

@@ -59,6 +59,11 @@ struct Config {
     int inner_columns = 9;
     int inner_rows = 6;
     double square_size_m = 0.03;
+    double mark_size_m = 0;  ///< 0: usual for the type
+    std::string dictionary = "auto";
+    int first_id = 0;
+    std::string legacy = "no";  ///< yes | no: ChArUco as OpenCV drew it before 4.6
+    std::string detector = "default";
     bool operator==(const Board&) const = default;
   } board;
 

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include "algorithms/calibration/solvers/solver_table.hpp"
+#include "algorithms/vision/detector_presets.hpp"
+#include "algorithms/vision/target_names.hpp"
+#include "app/config/board_config.hpp"
 #include "platform/loop/worker_pool.hpp"
 
 namespace firstlook {
@@ -10,7 +13,6 @@ namespace {
 
 constexpr std::string_view kStartSources[] = {"pendant", "panel"};
 constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"};
-constexpr std::string_view kBoardTypes[] = {"checkerboard"};
 constexpr std::string_view kHoles[] = {"ignore"};
 
 /// Every seed that a double of result.json's readers can hold exactly.
@@ -74,18 +76,43 @@ void add_space_keys(Keys& keys, Config& c) {
                   "sphere at the flange that holds camera and gripper until the calibration is accepted"});
 }
 
+constexpr std::array<std::string_view, 2> kYesNo = {"no", "yes"};
+
 void add_calibration_keys(Keys& keys, Config& c) {
   Config::Calibration& k = c.calibration;
-  keys.push_back({"board.type", &c.board.type, 0, 0, kBoardTypes, "kind of calibration board"});
+  keys.push_back({"board.type", &c.board.type, 0, 0, target_type_names(),
+                  "kind of calibration board; one that is set here hangs in the simulated cell, too"});
   keys.push_back({"board.inner_columns",
                   &c.board.inner_columns,
-                  3,
+                  1,
                   30,
                   {},
-                  "inner corners along a row; odd x even avoids a half-turn ambiguity"});
-  keys.push_back({"board.inner_rows", &c.board.inner_rows, 3, 30, {}, "inner corners along a column"});
-  keys.push_back(
-      {"board.square_size_m", &c.board.square_size_m, 0.002, 0.5, {}, "side of one square: measure the print"});
+                  "inner corners, circles or markers along a row; odd x even corners avoid a half-turn ambiguity"});
+  keys.push_back({"board.inner_rows",
+                  &c.board.inner_rows,
+                  1,
+                  30,
+                  {},
+                  "the same along a column; boards of one marker ignore both"});
+  keys.push_back({"board.square_size_m",
+                  &c.board.square_size_m,
+                  0.002,
+                  1.0,
+                  {},
+                  "distance of neighbours, side of one square or single marker: measure the print"});
+  keys.push_back({"board.mark_size_m",
+                  &c.board.mark_size_m,
+                  0,
+                  1.0,
+                  {},
+                  "side of a marker's black square, or diameter of a circle; 0: usual for the type"});
+  keys.push_back({"board.dictionary", &c.board.dictionary, 0, 0, dictionary_names(),
+                  "family of the markers; auto: usual for the type"});
+  keys.push_back({"board.first_id", &c.board.first_id, 0, 4095, {}, "number of the first marker"});
+  keys.push_back({"board.legacy", &c.board.legacy, 0, 0, kYesNo,
+                  "ChArUco as OpenCV drew it before 4.6: with an even number of rows of squares the first is white"});
+  keys.push_back({"board.detector", &c.board.detector, 0, 0, detector_preset_names(),
+                  "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
   keys.push_back({"calibration.views_min", &k.views_min, 3, 60, {}, "views of the board to take at least"});
   keys.push_back({"calibration.views_max", &k.views_max, 3, 60, {}, "and at most"});
@@ -241,6 +268,7 @@ std::string broken_rule(const Config& c) {
   if (c.calibration.views_min > c.calibration.views_max) {
     return "calibration.views_min must not exceed calibration.views_max";
   }
+  if (const auto board = board_of(c.board); !board) return fmt::format("board: {}", board.error().detail());
   // Three views are the fewest that can determine a hand-eye transform (two motions about different axes).
   if (c.calibration.views_min - c.calibration.holdout_views < 3) {
     return "calibration.views_min must exceed calibration.holdout_views by at least 3";

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <map>
 
-#include "algorithms/calibration/board_flips.hpp"
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/intrinsics.hpp"
 #include "algorithms/vision/board_pose.hpp"
+#include "algorithms/vision/target_detection.hpp"
+#include "algorithms/vision/target_names.hpp"
 #include "app/dataset/csv_table.hpp"
 #include "app/dataset/gray_image_file.hpp"
 
@@ -22,6 +24,8 @@ constexpr double kTranslationMax_m = 10;  // no arm that carries a camera reache
 
 constexpr std::array<std::string_view, 8> kPoseColumns = {"image", "x", "y", "z", "qx", "qy", "qz", "qw"};
 constexpr std::array<std::string_view, 5> kCornerColumns = {"image", "column", "row", "u_px", "v_px"};
+/// For boards whose points have no column and row: corners of markers, number 4 * marker + 0..3 clockwise.
+constexpr std::array<std::string_view, 4> kPointColumns = {"image", "point", "u_px", "v_px"};
 constexpr std::array<std::string_view, 14> kPairColumns = {
     "flange_x", "flange_y", "flange_z", "flange_qx", "flange_qy", "flange_qz", "flange_qw",
     "board_x",  "board_y",  "board_z",  "board_qx",  "board_qy",  "board_qz",  "board_qw"};
@@ -110,13 +114,17 @@ struct CornerRow {
 Result<CornerRow> corner_from(const CsvTable& table, const CsvRow& row, const BoardSpec& board,
                               const std::optional<CameraIntrinsics>& camera) {
   std::array<double, 4> v{};
-  for (std::size_t i = 0; i < v.size(); ++i) {
-    const auto number = table.number(row, 1 + i);
+  const std::size_t skipped = board.has_marker_corners() ? 1 : 0;  // one number instead of column and row
+  for (std::size_t i = skipped; i < v.size(); ++i) {
+    const auto number = table.number(row, 1 + i - skipped);
     if (!number) return std::unexpected(number.error());
     v[i] = *number;
   }
   const auto in_range = [](double x, int count) { return x >= 0 && x < count && x == std::floor(x); };
-  if (!in_range(v[0], board.inner_columns) || !in_range(v[1], board.inner_rows)) {
+  if (board.has_marker_corners() && !in_range(v[1], board.corners())) {
+    return failure(Fault::kDataMalformed, "{}: point {} on a board with {}", table.place(row), v[1], board.corners());
+  }
+  if (!board.has_marker_corners() && (!in_range(v[0], board.inner_columns) || !in_range(v[1], board.inner_rows))) {
     return failure(Fault::kDataMalformed, "{}: corner column {} row {} on a board of {}x{}", table.place(row), v[0],
                    v[1], board.inner_columns, board.inner_rows);
   }
@@ -126,14 +134,15 @@ Result<CornerRow> corner_from(const CsvTable& table, const CsvRow& row, const Bo
     return failure(Fault::kDataMalformed, "{}: corner at ({}, {}) px lies outside the {}x{} image of camera_info.yaml",
                    table.place(row), v[2], v[3], camera->width, camera->height);
   }
-  return CornerRow{row.fields[0], static_cast<int>(v[1]) * board.inner_columns + static_cast<int>(v[0]), {v[2], v[3]}};
+  const int lines = board.has_marker_corners() ? 1 : board.inner_columns;
+  return CornerRow{row.fields[0], static_cast<int>(v[1]) * lines + static_cast<int>(v[0]), {v[2], v[3]}};
 }
 
-/// Corners of each image that has all of them; images that have not are noted.
-Result<std::map<std::string, std::vector<Eigen::Vector2d>>> read_corners(const fs::path& file, const BoardSpec& board,
-                                                                         const std::optional<CameraIntrinsics>& camera,
-                                                                         std::vector<std::string>& notes) {
-  const auto table = read_csv(file, kCornerColumns);
+/// Corners of each image that has all of them, or enough where the board allows a part; images that have not are noted.
+Result<std::map<std::string, CornerSet>> read_corners(const fs::path& file, const BoardSpec& board,
+                                                      const std::optional<CameraIntrinsics>& camera,
+                                                      std::vector<std::string>& notes) {
+  const auto table = board.has_marker_corners() ? read_csv(file, kPointColumns) : read_csv(file, kCornerColumns);
   if (!table) return std::unexpected(table.error());
   const auto count = static_cast<std::size_t>(board.corners());
   std::map<std::string, std::vector<std::optional<Eigen::Vector2d>>> found;
@@ -147,17 +156,23 @@ Result<std::map<std::string, std::vector<Eigen::Vector2d>>> read_corners(const f
       return failure(Fault::kDataMalformed, "{}: this corner of '{}' a second time", table->place(row), corner->image);
     place = corner->pixel;
   }
-  std::map<std::string, std::vector<Eigen::Vector2d>> whole;
+  constexpr std::size_t kPointsMin = 4;
+  std::map<std::string, CornerSet> usable;
   for (const auto& [image, corners] : found) {
     const auto present = static_cast<std::size_t>(
         std::count_if(corners.begin(), corners.end(), [](const auto& c) { return c.has_value(); }));
-    if (present < count) {
+    if (present < (board.allows_partial_views() ? kPointsMin : count)) {
       notes.push_back(fmt::format("{}: left out, {} of {} corners", image, present, count));
       continue;
     }
-    for (const auto& corner : corners) whole[image].push_back(*corner);
+    CornerSet& set = usable[image];
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      if (!corners[i]) continue;
+      set.corners_px.push_back(*corners[i]);
+      if (present < count) set.ids.push_back(static_cast<int>(i));
+    }
   }
-  return whole;
+  return usable;
 }
 
 Status add_views_from_corners(const fs::path& folder, const std::vector<RecordedPose>& poses,
@@ -170,7 +185,7 @@ Status add_views_from_corners(const fs::path& folder, const std::vector<Recorded
       data.notes.push_back(fmt::format("{}: left out, no whole board in corners.csv", pose.image));
       continue;
     }
-    data.views.push_back({pose.base_T_flange, found->second});
+    data.views.push_back({pose.base_T_flange, found->second.corners_px, found->second.ids});
     data.names.push_back(pose.image);
     corners->erase(found);
   }
@@ -192,7 +207,8 @@ Status add_views_from_corners(const fs::path& folder, const std::vector<Recorded
 }
 
 Status add_views_from_images(const fs::path& folder, const std::vector<RecordedPose>& poses,
-                             const std::optional<CameraIntrinsics>& camera, CalibrationDataset& data) {
+                             const std::optional<CameraIntrinsics>& camera, const DetectionOptions& detection,
+                             CalibrationDataset& data) {
   for (const RecordedPose& pose : poses) {
     const auto picture = read_gray_image(folder / pose.image);
     if (!picture) return std::unexpected(picture.error());
@@ -205,12 +221,12 @@ Status add_views_from_images(const fs::path& folder, const std::vector<RecordedP
                      picture->height, camera ? "camera_info.yaml" : "the first image", data.camera.width,
                      data.camera.height);
     }
-    const auto corners = detect_checkerboard(picture->view(), data.board);
+    const auto corners = detect_target(picture->view(), data.board, detection);
     if (!corners) {
       data.notes.push_back(fmt::format("{}: left out, {}", pose.image, corners.error().detail()));
       continue;
     }
-    data.views.push_back({pose.base_T_flange, corners->corners_px});
+    data.views.push_back({pose.base_T_flange, corners->corners_px, corners->ids});
     data.names.push_back(pose.image);
   }
   if (data.views.empty()) {
@@ -251,26 +267,29 @@ Status calibrate_camera(CalibrationDataset& data) {
 
 /// Found corners of a board that looks the same upside down may begin at either end: the arm's motion tells.
 void settle_flips(CalibrationDataset& data) {
-  std::vector<PosePair> pairs;
+  std::vector<OpenView> open;
   for (const CalibrationView& view : data.views) {
     const auto pose = estimate_board_pose(data.camera, data.board, view.corners_px);
     if (!pose) return;
-    pairs.push_back({view.base_T_flange, pose->camera_T_board});
+    open.push_back(open_view(data.board, view, *pose));
   }
-  const std::vector<bool> flips = settle_board_flips(data.board, pairs);
-  for (std::size_t i = 0; i < flips.size(); ++i) {
-    if (flips[i]) std::reverse(data.views[i].corners_px.begin(), data.views[i].corners_px.end());
+  const auto choices = settle_choices(open);
+  int turned = 0;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    if (!open[i].choices[choices[i]].reversed) continue;
+    std::reverse(data.views[i].corners_px.begin(), data.views[i].corners_px.end());
+    ++turned;
   }
   data.notes.push_back(fmt::format(
       "a {}x{} board looks the same upside down: {} of {} views turned so that they agree with the arm's motion; a "
       "board "
       "of odd x even corners needs no guess",
-      data.board.inner_columns, data.board.inner_rows, std::count(flips.begin(), flips.end(), true), flips.size()));
+      data.board.inner_columns, data.board.inner_rows, turned, choices.size()));
 }
 
 }  // namespace
 
-Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder) {
+Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder, const DetectionOptions& detection) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) return failure(Fault::kDataMissing, "{}: no such folder", folder.string());
   if (!is_there(folder / "poses.csv") && is_there(folder / "pairs.csv")) return read_pair_dataset(folder);
@@ -290,7 +309,7 @@ Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder) {
   const bool with_corners = is_there(folder / "corners.csv");
   data.source = with_corners ? CalibrationSource::kCorners : CalibrationSource::kImages;
   const Status added = with_corners ? add_views_from_corners(folder, *poses, camera, data)
-                                    : add_views_from_images(folder, *poses, camera, data);
+                                    : add_views_from_images(folder, *poses, camera, detection, data);
   if (!added) return std::unexpected(added.error());
   if (!camera) {
     if (const Status calibrated = calibrate_camera(data); !calibrated) return std::unexpected(calibrated.error());

@@ -21,12 +21,6 @@ struct RecordedPose {
   Transform<Base, Flange> base_T_flange;
 };
 
-/// Corners of one image, all of them, row by row.
-struct RecordedCorners {
-  std::string image;
-  std::vector<Eigen::Vector2d> corners_px;
-};
-
 /// What a calibration is solved from. `views` for images and corners, `pairs` for pairs.csv.
 struct CalibrationDataset {
   CalibrationSource source = CalibrationSource::kImages;
@@ -44,10 +38,14 @@ struct CalibrationDataset {
 /// the board is not found are left out with a note. Quaternions within 1e-3 of unit length are normalised, others
 /// refused.
 /// @return kDataMissing or kDataMalformed, naming file and line
-[[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder);
+[[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder,
+                                                                  const DetectionOptions& detection = {});
 
 /// board.yaml alone. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);
+
+/// The text of a board.yaml.
+[[nodiscard]] std::string board_yaml(const BoardSpec& board);
 
 /// camera_info.yaml as ROS writes it. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<CameraIntrinsics> read_camera_info(const std::filesystem::path& file);

@@ -1,9 +1,11 @@
 /// The adapter to yaml-cpp for board.yaml and camera_info.yaml: its types and exceptions end here.
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "algorithms/vision/camera_model.hpp"
+#include "algorithms/vision/target_names.hpp"
 #include "app/dataset/calibration_dataset.hpp"
 
 namespace firstlook {
@@ -46,19 +48,31 @@ Result<T> load(const std::filesystem::path& file, Parse parse) {
 }
 
 BoardSpec parse_board(const YAML::Node& root) {
-  const auto type = value_of<std::string>(root, "type");
-  if (type != "checkerboard") {
-    throw Complaint{root["type"].Mark().line + 1,
-                    fmt::format("boards of type '{}' cannot be read, only checkerboard", type)};
+  TargetWords words;
+  words.type = value_of<std::string>(root, "type");
+  if (std::ranges::find(target_type_names(), words.type) == target_type_names().end()) {
+    throw Complaint{root["type"].Mark().line + 1, fmt::format("boards of type '{}' cannot be read, only {}", words.type,
+                                                              fmt::join(target_type_names(), ", "))};
   }
-  const BoardSpec board{value_of<int>(root, "inner_columns"), value_of<int>(root, "inner_rows"),
-                        value_of<double>(root, "square_size_m")};
-  const int size_line = root["square_size_m"].Mark().line + 1;
-  if (board.square_size_m > 1) {
-    throw Complaint{size_line, fmt::format("square_size_m is {}: that looks like millimetres", board.square_size_m)};
+  const bool alone = words.type == "marker" || words.type == "artoolkit";
+  const bool corners = words.type == "checkerboard" || words.type == "charuco";
+  const char* const spacing_key = alone ? "mark_size_m" : corners ? "square_size_m" : "spacing_m";
+  if (!alone) {
+    words.columns = value_of<int>(root, corners ? "inner_columns" : "columns");
+    words.rows = value_of<int>(root, corners ? "inner_rows" : "rows");
   }
-  if (const Status fine = check_board(board); !fine) throw Complaint{size_line, std::string(fine.error().detail())};
-  return board;
+  words.spacing_m = value_of<double>(root, spacing_key);
+  if (!alone && root["mark_size_m"]) words.mark_size_m = value_of<double>(root, "mark_size_m");
+  if (root["dictionary"]) words.dictionary = value_of<std::string>(root, "dictionary");
+  if (root["first_id"]) words.first_id = value_of<int>(root, "first_id");
+  if (root["legacy"]) words.legacy = value_of<bool>(root, "legacy");
+  const int size_line = root[spacing_key].Mark().line + 1;
+  if (words.spacing_m > 1) {
+    throw Complaint{size_line, fmt::format("{} is {}: that looks like millimetres", spacing_key, words.spacing_m)};
+  }
+  const auto board = target_from_words(words);
+  if (!board) throw Complaint{size_line, std::string(board.error().detail())};
+  return *board;
 }
 
 std::vector<double> numbers(const YAML::Node& root, const char* key, std::size_t least, std::size_t most) {
@@ -101,6 +115,22 @@ CameraIntrinsics parse_camera_info(const YAML::Node& root) {
 }
 
 }  // namespace
+
+std::string board_yaml(const BoardSpec& board) {
+  const TargetWords words = words_of(board);
+  std::string text = fmt::format("type: {}\n", words.type);
+  if (board.type == TargetType::kCheckerboard || board.type == TargetType::kCharuco) {
+    text += fmt::format("inner_columns: {}\ninner_rows: {}\nsquare_size_m: {}\n", words.columns, words.rows,
+                        words.spacing_m);
+  } else if (words.type != "marker" && words.type != "artoolkit") {
+    text += fmt::format("columns: {}\nrows: {}\nspacing_m: {}\n", words.columns, words.rows, words.spacing_m);
+  }
+  if (words.mark_size_m > 0) text += fmt::format("mark_size_m: {}\n", words.mark_size_m);
+  if (words.dictionary != "auto")
+    text += fmt::format("dictionary: {}\nfirst_id: {}\n", words.dictionary, words.first_id);
+  if (words.legacy) text += "legacy: true\n";
+  return text;
+}
 
 Result<BoardSpec> read_board(const std::filesystem::path& file) { return load<BoardSpec>(file, parse_board); }
 

@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/camera_on_arm.hpp"
 #include "algorithms/view_planning/identify.hpp"
 #include "algorithms/view_planning/locate.hpp"
+#include "algorithms/vision/detector_presets.hpp"
+#include "algorithms/vision/target_detection.hpp"
 #include "app/jobs/workbench.hpp"
 
 namespace firstlook {
@@ -46,7 +49,8 @@ Result<CornerSet> Workbench::corners_of(const hal::Frame& frame) {
   const CameraIntrinsics& camera = color_.intrinsics();
   const MutableGrayImage image{gray_.items().data(), camera.width, camera.height};
   if (const Status read = color_.read(frame, image); !read) return std::unexpected(read.error());
-  return detect_checkerboard(GrayImage{image.data, image.width, image.height}, board_);
+  const auto preset = find_detector_preset(config_.board.detector).value_or(DetectorPreset{});
+  return detect_target(GrayImage{image.data, image.width, image.height}, board_, preset.detection);
 }
 
 Result<CornerSet> Workbench::averaged_corners(const DetectArguments& arguments) {
@@ -68,12 +72,26 @@ void Workbench::keep_picture(std::size_t observation) {
   std::copy(from.begin(), from.end(), pictures_.items().begin() + static_cast<std::ptrdiff_t>(observation * pixels));
 }
 
+/// Which of the poses that each picture allows was true: the views taken so far tell it of each other.
+void Workbench::settle_observations(BoardLook purpose) {
+  std::vector<OpenView> open;
+  for (const Observation& o : observations_) open.push_back(open_view(board_, o.view, o.pose));
+  const bool verifies = purpose == BoardLook::kVerify && facts_.stored;
+  const auto choices = verifies ? settle_choices(open, facts_.stored->flange_T_camera) : settle_choices(open);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const PoseChoice& choice = open[i].choices[choices[i]];
+    Observation& o = observations_[i];
+    adopt_choice(board_, choice, o.pose);
+    if (choice.reversed) std::reverse(o.view.corners_px.begin(), o.view.corners_px.end());
+  }
+}
+
 DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   DetectResult result;
   if (arguments.purpose == BoardLook::kVerify) ++verification_looks_;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners->corners_px);
+  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
   if (!pose) return result;
   result.found = true;
   result.rms_px = pose->residual_rms_px;
@@ -93,11 +111,12 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     Observation o;
     o.joints_rad = last.at_rad;
     o.time_s = last.frame.stamp.seconds();
-    o.view = {forward(arm_, last.at_rad).flange(), corners->corners_px};
+    o.view = {forward(arm_, last.at_rad).flange(), corners->corners_px, corners->ids};
     o.pose = *pose;
     o.residual_rms_px = pose->residual_rms_px;
     keep_picture(observations_.size());
     observations_.push_back(std::move(o));
+    settle_observations(arguments.purpose);
   }
   return result;
 }
@@ -107,7 +126,7 @@ CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   if (!hand_eye_) return result;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners->corners_px);
+  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
   if (!pose) return result;
   result.seen = true;
   const auto base_T_flange = forward(arm_, arguments.frames.back().at_rad).flange();

@@ -184,6 +184,7 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
     r.joints_rad = o.joints_rad;
     r.base_T_flange = o.view.base_T_flange;
     r.detected_px = o.view.corners_px;
+    r.detected_ids = o.view.ids;
     r.rms_px = o.residual_rms_px;
     if (hand_eye_) {
       r.counted = place != counted.end();
@@ -191,8 +192,8 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
       if (k < hand_eye_->holdout_px.size()) r.holdout_px = hand_eye_->holdout_px[k];
       const auto camera_T_board =
           (o.view.base_T_flange * hand_eye_->flange_T_camera).inverse() * hand_eye_->base_T_board;
-      for (int c = 0; c < board_.corners(); ++c) {
-        const auto pixel = project(camera, camera_T_board * board_.corner(c));
+      for (std::size_t c = 0; c < o.view.corners_px.size(); ++c) {
+        const auto pixel = project(camera, camera_T_board * board_.corner(point_of(o.view.ids, c)));
         r.reprojected_px.push_back(pixel.value_or(Eigen::Vector2d(-1, -1)));
       }
       double sum = 0;

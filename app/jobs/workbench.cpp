@@ -1,4 +1,5 @@
 #include "app/jobs/workbench.hpp"
+#include "app/config/board_config.hpp"
 
 #include <algorithm>
 
@@ -63,7 +64,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       color_(color),
       depth_(depth),
       workers_(workers),
-      board_{config.board.inner_columns, config.board.inner_rows, config.board.square_size_m},
+      board_(board_of(config.board).value_or(BoardSpec{})),  // load_config has refused what is no board
       limits_{config.arm.speed_max_m_s, config.arm.speed_max_rad_s, config.arm.acceleration_rad_s2},
       zone_cylinder_{config.safe_zone.radius_m, config.safe_zone.height_m, config.cart.top_m},
       envelope_body_(body_with_envelope(arm, config.camera_envelope_radius_m)),
@@ -100,7 +101,8 @@ Status Workbench::take_memory() {
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
-  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * sizeof(Eigen::Vector2d);
+  const std::size_t point = sizeof(Eigen::Vector2d) + (board_.allows_partial_views() ? sizeof(int) : 0);
+  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * point;
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,

@@ -128,6 +128,7 @@ class Workbench {
   [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
   [[nodiscard]] Result<CornerSet> averaged_corners(const DetectArguments& arguments);
   void keep_picture(std::size_t observation);
+  void settle_observations(BoardLook purpose);
   [[nodiscard]] std::optional<ViewDesignModel> rough_model() const;
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
   [[nodiscard]] ArmSigma arm_sigma_expected() const;

@@ -78,6 +78,7 @@ struct CalibrationViewRecord {
   JointVector joints_rad;
   Transform<Base, Flange> base_T_flange;
   std::vector<Eigen::Vector2d> detected_px;
+  std::vector<int> detected_ids;                ///< the board's point that each of them is; empty: all, in order
   std::vector<Eigen::Vector2d> reprojected_px;  ///< same order; empty when not solved
   double rms_px = 0;                            ///< of the above: no deviation of the arm is granted
   std::optional<double> holdout_px;  ///< the same under a solve that left this view out; empty: not validated

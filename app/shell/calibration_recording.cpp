@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "app/config/board_config.hpp"
+#include "app/dataset/calibration_dataset.hpp"
 #include "app/report/picture_bytes.hpp"
 #include "app/report/ros_files.hpp"
 #include "platform/linux/files.hpp"
@@ -21,7 +23,9 @@ std::string pose_row(const std::string& image, const Transform<Base, Flange>& po
 Status write_calibration_recording(const std::string& folder, const RunRecord& record, const Config& config) {
   if (const Status made = make_directories(folder + "/images"); !made) return made;
   std::string poses = "image,x,y,z,qx,qy,qz,qw\n";
-  std::string corners = "image,column,row,u_px,v_px\n";
+  const auto board = board_of(config.board);
+  if (!board) return std::unexpected(board.error());
+  std::string corners = board->has_marker_corners() ? "image,point,u_px,v_px\n" : "image,column,row,u_px,v_px\n";
   bool pictures = true;
   std::vector<std::pair<std::string, std::string>> texts;
   for (std::size_t i = 0; i < record.calibration_views.size(); ++i) {
@@ -35,16 +39,15 @@ Status write_calibration_recording(const std::string& folder, const RunRecord& r
         return s;
     }
     for (std::size_t c = 0; c < view.detected_px.size(); ++c) {
-      const auto columns = static_cast<std::size_t>(config.board.inner_columns);
-      corners += fmt::format("{},{},{},{:.6f},{:.6f}\n", image, c % columns, c / columns, view.detected_px[c].x(),
-                             view.detected_px[c].y());
+      const int id = point_of(view.detected_ids, c), columns = board->inner_columns;
+      const std::string place =
+          board->has_marker_corners() ? fmt::format("{}", id) : fmt::format("{},{}", id % columns, id / columns);
+      corners += fmt::format("{},{},{:.6f},{:.6f}\n", image, place, view.detected_px[c].x(), view.detected_px[c].y());
     }
   }
   texts.emplace_back("poses.csv", poses);
   if (!pictures) texts.emplace_back("corners.csv", corners);
-  texts.emplace_back("board.yaml",
-                     fmt::format("type: checkerboard\ninner_columns: {}\ninner_rows: {}\nsquare_size_m: {}\n",
-                                 config.board.inner_columns, config.board.inner_rows, config.board.square_size_m));
+  texts.emplace_back("board.yaml", board_yaml(*board));
   if (record.intrinsics.width > 0) texts.emplace_back("camera_info.yaml", camera_info_yaml(record.intrinsics));
   for (const auto& [name, text] : texts) {
     if (const Status s = write_file_atomically(fmt::format("{}/{}", folder, name), text); !s) return s;

@@ -37,9 +37,10 @@ class FrameStream {
   [[nodiscard]] virtual StreamCounters counters() const = 0;
 };
 
-/// Image points of the board's inner corners, row by row, as a camera that finds them itself reports them.
+/// Image points of the board's points (BoardSpec::corner), in their order, as a camera that finds them itself reports
+/// them.
 struct CornerObservation {
-  static constexpr std::size_t kCornersMax = 256;
+  static constexpr std::size_t kCornersMax = 512;
   FixedVector<std::array<float, 2>, kCornersMax> corners_px;  ///< empty: the board is not seen whole
 };
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "algorithms/vision/camera_model.hpp"
+#include "algorithms/vision/target_names.hpp"
 #include "hal/sim/built_in_cells.hpp"
 #include "hal/sim/random_cell.hpp"
 #include "hal/sim/triangulation.hpp"
@@ -264,17 +265,23 @@ Pose board_orientation(const Vector3d& faces, const Vector3d& center, double rol
 
 void read_board(const Section& cell, Scene& scene) {
   const Section board(cell.file(), cell.child("board"), "board",
-                      {"center_m", "faces", "roll_deg", "inner_columns", "inner_rows", "square_size_m",
-                       "white_margin_m", "thickness_m"});
+                      {"center_m", "faces", "roll_deg", "type", "inner_columns", "inner_rows", "square_size_m",
+                       "mark_size_m", "dictionary", "first_id", "legacy", "white_margin_m", "thickness_m"});
   BoardPlacement& placed = scene.board;
-  placed.spec.inner_columns = board.integer_or("inner_columns", placed.spec.inner_columns, 3, 85);
-  placed.spec.inner_rows = board.integer_or("inner_rows", placed.spec.inner_rows, 3, 85);
-  placed.spec.square_size_m = board.number_or("square_size_m", placed.spec.square_size_m, 0.001, 1);
+  TargetWords words;
+  words.type = board.text_or("type", words.type);
+  words.columns = board.integer_or("inner_columns", words.columns, 1, 85);
+  words.rows = board.integer_or("inner_rows", words.rows, 1, 85);
+  words.spacing_m = board.number_or("square_size_m", words.spacing_m, 0.001, 1);
+  words.mark_size_m = board.number_or("mark_size_m", 0, 0, 1);
+  words.dictionary = board.text_or("dictionary", words.dictionary);
+  words.first_id = board.integer_or("first_id", 0, 0, 4095);
+  words.legacy = board.flag_or("legacy", false);
   placed.white_margin_m = board.number_or("white_margin_m", placed.white_margin_m, 0, 1);
   placed.thickness_m = board.number_or("thickness_m", placed.thickness_m, 0.001, 0.2);
-  if (const Status usable = check_board(placed.spec); !usable) {
-    board.fail(cell.child("board"), "{}", usable.error().detail());
-  }
+  const auto spec = target_from_words(words);
+  if (!spec) board.fail(cell.child("board"), "{}", spec.error().detail());
+  placed.spec = *spec;
   const Vector3d faces = board.vector("faces"), center = board.vector("center_m");
   if (faces.norm() < 1e-6) board.fail(board.child("faces"), "board.faces must not be zero");
   if (faces.normalized().cross(Vector3d::UnitZ()).norm() < 0.1 && std::hypot(center.x(), center.y()) < 1e-6) {

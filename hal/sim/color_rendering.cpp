@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "algorithms/vision/target_pattern.hpp"
 #include "hal/sim/body_image.hpp"
 #include "hal/sim/pixel_noise.hpp"
 
@@ -236,10 +237,7 @@ class ColorFrame {
 }  // namespace
 
 float board_reflectance(const BoardPlacement& board, double x_m, double y_m) {
-  const int column = static_cast<int>(std::floor(x_m / board.spec.square_size_m));
-  const int row = static_cast<int>(std::floor(y_m / board.spec.square_size_m));
-  const bool on_pattern = column >= -1 && row >= -1 && column < board.spec.inner_columns && row < board.spec.inner_rows;
-  return on_pattern && (column + row) % 2 == 0 ? kBlack : kWhite;
+  return is_dark(board.spec, x_m, y_m) ? kBlack : kWhite;
 }
 
 double shade(const Light& light, double reflectance, const Vector3d& point_m, const Vector3d& normal) {

@@ -7,8 +7,7 @@
 
 namespace firstlook::sim {
 
-/// Reflectance of a board's front at a point of its plane, in board coordinates: dark and light squares, white around
-/// them.
+/// Reflectance of a board's front at a point of its plane, in board coordinates: ink, or white.
 [[nodiscard]] float board_reflectance(const BoardPlacement& board, double x_m, double y_m);
 
 /// Brightness of a diffuse surface: reflectance, times the light at a point with this unit normal.

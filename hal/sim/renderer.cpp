@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "algorithms/vision/camera_model.hpp"
+#include "algorithms/vision/target_pattern.hpp"
 #include "hal/sim/body_image.hpp"
 #include "hal/sim/color_rendering.hpp"
 #include "hal/sim/depth_rendering.hpp"
@@ -24,6 +25,10 @@ constexpr double kEndSlack_m = 0.001;       // a point on a surface is not hidde
 constexpr double kBoardTiltMax_rad = 1.22;  // 70 degrees: squares become slivers
 constexpr double kSquareWidthMin_px = 6;    // below that no detector finds corners
 constexpr std::uint64_t kCornerStream = 5001;
+
+double neighbour_distance_m(const BoardSpec& board) {
+  return board.has_marker_corners() ? board.mark_size_m : board.square_size_m;
+}
 
 }  // namespace
 
@@ -86,13 +91,19 @@ bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const
   const Vector3d center = camera_T_board * board.spec.center();
   const double facing = center.dot(camera_T_board.rotation().col(2)) / center.norm();
   if (!(center.z() > 0) || facing < std::cos(kBoardTiltMax_rad)) return false;
-  if (camera.fx * board.spec.square_size_m * facing / center.z() < kSquareWidthMin_px) return false;
+  // Of the finest detail that a detector must resolve.
+  const double width_px = camera.fx * neighbour_distance_m(board.spec) * facing / center.z();
+  if (width_px / board.spec.detail_ratio() < kSquareWidthMin_px) return false;
   const BodyImage hiding(body, base_T_camera.pose(), base_T_camera.translation());
   const Vector3d eye = base_T_camera.translation();
-  // The inner corners and one square more all around: the outer squares belong to the pattern.
-  for (int row = -1; row <= board.spec.inner_rows; ++row) {
-    for (int column = -1; column <= board.spec.inner_columns; ++column) {
-      const Vector3d on_board = board.spec.square_size_m * Vector3d(column, row, 0);
+  // A lattice over all the ink: for checkerboards the corners of all squares.
+  const InkExtent ink = ink_extent(board.spec);
+  const int columns = board.spec.inner_columns + 1, rows = board.spec.inner_rows + 1;
+  for (int row = 0; row <= rows; ++row) {
+    for (int column = 0; column <= columns; ++column) {
+      const Eigen::Vector2d share(static_cast<double>(column) / columns - 0.5, static_cast<double>(row) / rows - 0.5);
+      const Eigen::Vector2d at_ink = ink.center_m + share.cwiseProduct(ink.size_m);
+      const Vector3d on_board(at_ink.x(), at_ink.y(), 0);
       const Vector3d at = camera_T_board * on_board;
       const auto pixel = project(camera, at);
       if (!pixel || !in_image(camera, *pixel, margin_px)) return false;

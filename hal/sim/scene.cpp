@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "algorithms/vision/target_pattern.hpp"
+
 namespace firstlook::sim {
 namespace {
 
@@ -173,9 +175,8 @@ CameraMount default_mount(int joints) {
 }
 
 Solid board_panel(const BoardPlacement& board) {
-  const double square = board.spec.square_size_m;
-  const Vector3d size(square * (board.spec.inner_columns + 1) + 2 * board.white_margin_m,
-                      square * (board.spec.inner_rows + 1) + 2 * board.white_margin_m, board.thickness_m);
+  const Eigen::Vector2d ink = ink_extent(board.spec).size_m;
+  const Vector3d size(ink.x() + 2 * board.white_margin_m, ink.y() + 2 * board.white_margin_m, board.thickness_m);
   Solid panel;
   panel.name = "board";
   panel.shape = Box{0.5 * size};
@@ -188,6 +189,13 @@ Solid board_panel(const BoardPlacement& board) {
 void move_board(Scene& scene, const Transform<Base, Board>& base_T_board) {
   scene.board.base_T_board = base_T_board;
   scene.solids[scene.board_solid] = board_panel(scene.board);
+}
+
+void exchange_board(Scene& scene, const BoardSpec& board) {
+  Pose base_T_board = scene.board.base_T_board.pose();
+  base_T_board.translate(scene.board.spec.center() - board.center());
+  scene.board.spec = board;
+  move_board(scene, Transform<Base, Board>(base_T_board));
 }
 
 }  // namespace firstlook::sim

@@ -11,7 +11,7 @@
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/mapping/grid_geometry.hpp"
 #include "algorithms/mapping/safe_zone.hpp"
-#include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/joint_vector.hpp"
 #include "platform/core/transform.hpp"
@@ -125,6 +125,9 @@ struct Scene {
 
 /// Puts the board elsewhere and its panel with it.
 void move_board(Scene& scene, const Transform<Base, Board>& base_T_board);
+
+/// Hangs another board at the same place: the middles of the points and the directions of the rows are the same.
+void exchange_board(Scene& scene, const BoardSpec& board);
 
 /// The panel that carries a board.
 [[nodiscard]] Solid board_panel(const BoardPlacement& board);

@@ -70,9 +70,7 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, Dept
   d.depth_range_max_m = renderer.sensor().range_max_m;
   d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
   d.camera_T_depth = scene.mount.camera_T_depth;
-  d.board_columns = scene.board.spec.inner_columns;
-  d.board_rows = scene.board.spec.inner_rows;
-  d.board_square_m = scene.board.spec.square_size_m;
+  d.board = scene.board.spec;
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;
   for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});
@@ -154,8 +152,9 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   const memory::SimulationScope simulation;
   const Result<Faults> faults = parse_faults(options.faults);
   if (!faults) return std::unexpected(faults.error());
-  const Result<Scene> scene = load_cell(options.cell, options.seed);
+  Result<Scene> scene = load_cell(options.cell, options.seed);
   if (!scene) return std::unexpected(scene.error());
+  if (options.board) exchange_board(*scene, *options.board);
   const std::optional<ArmModel> model = find_arm_model(scene->arm_model);
   if (!model) return failure(Fault::kCellInvalid, "{}: no arm model '{}'", scene->name, scene->arm_model);
   if (scene->start_rad.size() != model->joints) {

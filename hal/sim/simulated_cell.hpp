@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "algorithms/mapping/safe_zone.hpp"
+#include "algorithms/vision/target.hpp"
 #include "hal/api/cameras.hpp"
 #include "hal/api/operator_devices.hpp"
 #include "hal/api/robot_arm.hpp"
@@ -19,11 +21,12 @@
 namespace firstlook::sim {
 
 struct SimulationOptions {
-  std::string cell = "workshop";  ///< built-in name, "random:SEED", or a file
-  std::uint64_t seed = 1;         ///< of noise, deviations, faults and the true mount
-  bool fast_sensor = false;       ///< coarser depth, corners instead of pixels
-  std::string faults;             ///< faults.hpp
-  int workers = 2;                ///< threads of the observable set; results do not depend on it
+  std::string cell = "workshop";     ///< built-in name, "random:SEED", or a file
+  std::uint64_t seed = 1;            ///< of noise, deviations, faults and the true mount
+  bool fast_sensor = false;          ///< coarser depth, corners instead of pixels
+  std::string faults;                ///< faults.hpp
+  int workers = 2;                   ///< threads of the observable set; results do not depend on it
+  std::optional<BoardSpec> board{};  ///< hangs in the cell in place of the cell's own
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.
@@ -45,9 +48,7 @@ struct CellDescription {
   double depth_range_trusted_m = 3.0;
   double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
-  int board_columns = 9;                    ///< inner corners
-  int board_rows = 6;
-  double board_square_m = 0.03;
+  BoardSpec board;
   double cart_top_m = -0.02;  ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;

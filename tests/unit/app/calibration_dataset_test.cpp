@@ -43,11 +43,6 @@ std::string numbers(const Pose& pose) {
                      q.z(), q.w());
 }
 
-std::string board_yaml(const BoardSpec& b) {
-  return fmt::format("type: checkerboard\ninner_columns: {}\ninner_rows: {}\nsquare_size_m: {}\n", b.inner_columns,
-                     b.inner_rows, b.square_size_m);
-}
-
 std::string camera_yaml(const CameraIntrinsics& c) {
   return fmt::format(
       "image_width: {}\nimage_height: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}, 0, {}, 0, {}, {}, 0, 0, 1]}}\n"
@@ -237,8 +232,10 @@ TEST_CASE("unusable boards and cameras are refused", "[app][calibration]") {
   check_refused(folder, Fault::kDataMalformed, "board.yaml:4");
   folder.write("board.yaml", "type: checkerboard\ninner_columns: 8\ninner_rows: 6\nsquare_size_m: 30\n");
   check_refused(folder, Fault::kDataMalformed, "millimetres");
-  folder.write("board.yaml", "type: charuco\ninner_columns: 8\ninner_rows: 6\nsquare_size_m: 0.03\n");
-  check_refused(folder, Fault::kDataMalformed, "charuco");
+  folder.write("board.yaml", "type: cheese\ninner_columns: 8\ninner_rows: 6\nsquare_size_m: 0.03\n");
+  check_refused(folder, Fault::kDataMalformed, "charuco");  // one of those it names
+  folder.write("board.yaml", "type: aruco\ncolumns: 8\nrows: 7\nspacing_m: 0.03\ndictionary: 4x4_50\n");
+  check_refused(folder, Fault::kDataMalformed, "dictionary 4x4_50 ends with 49");
   folder.write("board.yaml", "type: checkerboard\ninner_columns: eight\ninner_rows: 6\nsquare_size_m: 0.03\n");
   check_refused(folder, Fault::kDataMalformed, "board.yaml:2");
   folder.write("board.yaml", "type: [checkerboard\n");
@@ -364,5 +361,56 @@ TEST_CASE("the recorded Franka set gives its published transform, with honest si
     const auto less = solve_hand_eye(data->camera, data->board, views);
     REQUIRE(less);
     CHECK((less->flange_T_camera.translation() - published).norm() < 3 * result->sigma_translation_m.norm());
+  }
+}
+
+TEST_CASE("boards of markers: half of the points in each view, from corners and from images", "[app][calibration]") {
+  Setup setup;
+  setup.board = {5, 4, 0.055, TargetType::kMarkerGrid, 0.044, MarkerDictionary::kAprilTag36h11};
+  Random random(64);
+  std::vector<CalibrationView> views = test::observe_views(setup, 15, random);
+  std::string poses = kPosesHeader, corners = "image,point,u_px,v_px\n";
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    poses += fmt::format("{}.png,{}\n", i, numbers(views[i].base_T_flange.pose()));
+    for (int c = 0; c < setup.board.corners(); ++c) {
+      if ((c / 4 + static_cast<int>(i)) % 2 == 0) continue;  // every second marker is hidden
+      const auto& px = views[i].corners_px[static_cast<std::size_t>(c)];
+      corners += fmt::format("{}.png,{},{:.9g},{:.9g}\n", i, c, px.x(), px.y());
+    }
+  }
+  const Folder folder("marker_corners");
+  folder.write("board.yaml", board_yaml(setup.board));
+  folder.write("camera_info.yaml", camera_yaml(setup.camera));
+  folder.write("poses.csv", poses);
+  folder.write("corners.csv", corners);
+  const auto data = read_calibration_dataset(folder.path);
+  REQUIRE(data);
+  CHECK(data->board == setup.board);
+  REQUIRE(data->views.size() == 15);
+  CHECK(data->views[0].ids.size() == 40);
+  const auto result = calibrate_hand_eye(data->camera, data->board, data->views);
+  REQUIRE(result);
+  const Vector6d off = pose_difference(setup.flange_T_camera, result->flange_T_camera.pose());
+  CHECK(off.dot(result->covariance.ldlt().solve(off)) < 22.5);  // 99.9 % of a chi squared of 6
+  CHECK(off.head<3>().norm() < 0.001);
+  CHECK(result->reprojection_rms_px == Approx(0.1).margin(0.02));
+
+  folder.write("corners.csv", corners + "0.png,80,10,10\n");
+  check_refused(folder, Fault::kDataMalformed, "point 80 on a board with 80");
+}
+
+TEST_CASE("board.yaml is read as it was written, for every type", "[app][calibration]") {
+  const Folder folder("board_yaml");
+  for (const BoardSpec& board :
+       {BoardSpec{9, 6, 0.0236}, BoardSpec{4, 11, 0.02, TargetType::kAsymmetricCircles, 0.016},
+        BoardSpec{6, 5, 0.04, TargetType::kCharuco, 0.031, MarkerDictionary::k5x5_100, 3, true},
+        BoardSpec{1, 1, 0.1, TargetType::kMarkerGrid, 0.1, MarkerDictionary::kAprilTag25h9, 4},
+        BoardSpec{3, 2, 0.07, TargetType::kMarkerGrid, 0.05, MarkerDictionary::kArtoolkitPlusBch, 4},
+        BoardSpec{1, 1, 0.08, TargetType::kPatternMarker, 0.08}}) {
+    folder.write("board.yaml", board_yaml(board));
+    const auto again = read_board(folder.path / "board.yaml");
+    CAPTURE(board_yaml(board));
+    REQUIRE(again);
+    CHECK(*again == board);
   }
 }

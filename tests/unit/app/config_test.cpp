@@ -1,5 +1,6 @@
 /// The configuration: what it accepts, what it refuses and how well it says so.
 #include "app/config/config.hpp"
+#include "app/config/board_config.hpp"
 
 #include <catch2/catch.hpp>
 #include <filesystem>
@@ -7,6 +8,7 @@
 #include <iterator>
 
 #include "app/cli/small_commands.hpp"
+#include "app/config/board_config.hpp"
 #include "app/config/config_keys.hpp"
 #include "app/config/load_config.hpp"
 #include "app/config/nearest_name.hpp"
@@ -38,7 +40,7 @@ Config all_changed() {
   c.keep_out = {{{-1, -2, 0}, {1, -1.5, 2}}, {{0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}}};
   c.camera_envelope_radius_m = 0.15;
   c.parking_rad = JointVector{0, -1.5707963267948966, 1e-17, 0.5, -0.25, 3};
-  c.board = {"checkerboard", 7, 5, 0.0251};
+  c.board = {"charuco", 7, 5, 0.0251, 0.018, "5x5_100", 3, "yes", "thesis2014"};
   c.calibration = {"tsai-lenz",
                    9,
                    31,
@@ -221,4 +223,22 @@ TEST_CASE("explain knows every fault and refuses the rest", "[config]") {
   CHECK(run_explain_command("E5004") == 0);
   CHECK(run_explain_command("5004") == 0);
   for (const char* wrong : {"", "E", "E9999", "5004x", "protective stop"}) CHECK(run_explain_command(wrong) == 2);
+}
+
+TEST_CASE("keys of a board and the board itself mean the same", "[app][config]") {
+  Config::Board keys;
+  CHECK_FALSE(names_a_board(keys));
+  keys.detector = "thesis2014";
+  CHECK_FALSE(names_a_board(keys));
+  keys.type = "charuco";
+  keys.legacy = "yes";
+  CHECK(names_a_board(keys));
+  const auto board = board_of(keys);
+  REQUIRE(board);
+  CHECK(board->legacy);
+  Config::Board same;
+  same.detector = "thesis2014_plain";
+  set_board(*board, same);
+  CHECK(same.detector == "thesis2014_plain");
+  CHECK(board_of(same).value() == *board);
 }

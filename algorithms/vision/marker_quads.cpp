@@ -1,0 +1,278 @@
+/// The adapter to OpenCV's threshold, contours and polygons: its types and exceptions end here.
+#include "algorithms/vision/marker_quads.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <span>
+
+namespace firstlook {
+namespace {
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+double shortest_side(const Quad& quad) {
+  double shortest = (quad[0] - quad[3]).norm();
+  for (std::size_t i = 0; i < 3; ++i) shortest = std::min(shortest, (quad[i + 1] - quad[i]).norm());
+  return shortest;
+}
+
+bool is_same(const Quad& a, const Quad& b, double near_px) {
+  // Most are far apart: the middles of the diagonals tell without the turns.
+  if ((a[0] + a[2] - b[0] - b[2]).cwiseAbs().maxCoeff() > 8 * near_px) return false;
+  for (std::size_t turn = 0; turn < 4; ++turn) {
+    bool same = true;
+    for (std::size_t i = 0; i < 4 && same; ++i) same = (a[i] - b[(i + turn) % 4]).norm() < near_px;
+    if (same) return true;
+  }
+  return false;
+}
+
+/// The contour as a convex quadrangle, clockwise; empty when it is none.
+std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_min_px) {
+  const double perimeter = static_cast<double>(contour.size());
+  if (perimeter < 4 * side_min_px) return std::nullopt;
+  // A tenth of a side: bent or frayed sides stay one side.
+  constexpr double kTolerance = 0.025;
+  std::vector<cv::Point> polygon;
+  cv::approxPolyDP(contour, polygon, kTolerance * cv::arcLength(contour, true), true);
+  if (polygon.size() != 4 || !cv::isContourConvex(polygon)) return std::nullopt;
+  Quad quad;
+  for (std::size_t i = 0; i < 4; ++i) quad[i] = {polygon[i].x, polygon[i].y};
+  if (cross(quad[1] - quad[0], quad[2] - quad[0]) < 0) std::swap(quad[1], quad[3]);
+  if (shortest_side(quad) < side_min_px) return std::nullopt;
+  return quad;
+}
+
+/// False for a picture of noise, which it is at every window.
+bool add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
+  constexpr double kDarker = 7;  // grey levels below the mean of the window
+  cv::Mat dark;
+  cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
+  std::vector<std::vector<cv::Point>> contours;
+  std::vector<cv::Vec4i> tree;
+  cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
+  // White noise has a contour for every 60 pixels, the densest board that can be read (2.5 pixels a cell) for every
+  // 150.
+  constexpr std::size_t kPixelsMin = 100, kAlways = 6000;
+  if (contours.size() > std::max(kAlways, dark.total() / kPixelsMin)) return false;
+  for (std::size_t i = 0; i < contours.size(); ++i) {
+    constexpr int kParent = 3;
+    if (tree[i][kParent] >= 0) continue;  // the inner edge of a dark ring
+    const auto quad = quad_of(contours[i], side_min_px);
+    if (!quad) continue;
+    const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
+    if (std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q, near_px); })) {
+      quads.push_back(*quad);
+    }
+  }
+  return true;
+}
+
+std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
+  constexpr int kWidthMax_px = 1300;
+  constexpr std::array<int, 3> kWindows_px = {11, 25, 61};
+  const bool half = image.cols > kWidthMax_px;
+  cv::Mat searched = image;
+  if (half) cv::resize(image, searched, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+  // Noise that is as deep as the threshold would tie dark specks to the outlines.
+  cv::Mat smooth;
+  cv::GaussianBlur(searched, smooth, cv::Size(3, 3), 0);
+  searched = smooth;
+  std::vector<Quad> quads;
+  for (const int window : kWindows_px) {
+    if (!add_quads(searched, window, half ? side_min_px / 2 : side_min_px, quads)) break;
+  }
+  if (!half) return quads;
+  for (Quad& quad : quads) {
+    for (Eigen::Vector2d& p : quad) p = (p.array() + 0.5) * 2 - 0.5;
+  }
+  return quads;
+}
+
+/// A side as a parabola over the line from one rough corner to the other: point(t) = start + t along + f(t) outward.
+struct Side {
+  Eigen::Vector2d start, along, outward;
+  Eigen::Vector3d f = Eigen::Vector3d::Zero();  ///< f(t) = f0 + f1 t + f2 t^2, t and f in pixels
+
+  [[nodiscard]] Eigen::Vector2d point(double t) const {
+    return start + t * along + (f[0] + t * (f[1] + t * f[2])) * outward;
+  }
+  [[nodiscard]] Eigen::Vector2d tangent(double t) const { return along + (f[1] + 2 * t * f[2]) * outward; }
+};
+
+struct EdgePoint {
+  double t = 0, offset = 0;
+  double rise = 0;  ///< grey levels from dark to white
+};
+
+/// Where the grey values rise across the side at t, within `reach_px` of its present curve: the centre of the rises.
+/// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
+std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t, double reach_px) {
+  constexpr double kStep_px = 0.5;
+  constexpr double kRiseMin = 8;  // grey levels, all rises together
+  const double middle = side.f[0] + t * (side.f[1] + t * side.f[2]);
+  const Eigen::Vector2d on_line = side.start + t * side.along;
+  const int steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
+  double sum = 0, moment = 0, rises = 0;
+  double before = gray_between(image, on_line + (middle - reach_px) * side.outward);
+  for (int i = 1; i <= steps; ++i) {
+    const double offset = middle - reach_px + i * kStep_px;
+    const double here = gray_between(image, on_line + offset * side.outward);
+    const double rise = std::max(0.0, here - before);
+    rises += rise;
+    sum += rise;
+    moment += rise * (offset - kStep_px / 2);
+    before = here;
+  }
+  if (rises < kRiseMin) return std::nullopt;
+  return EdgePoint{t, moment / sum, rises};
+}
+
+/// Least squares of degree 1 or 2, with the sum of squared residuals.
+struct CurveFit {
+  Eigen::Vector3d f = Eigen::Vector3d::Zero();
+  double squared = 0;
+  double bend_sigma = 0;  ///< of f2 for an offset sigma of 1
+};
+
+CurveFit fit_curve(const std::vector<EdgePoint>& points, bool bent) {
+  std::array<double, 5> powers{};  // sums of t^k
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const EdgePoint& p : points) {
+    const double t2 = p.t * p.t;
+    powers[0] += 1, powers[1] += p.t, powers[2] += t2, powers[3] += t2 * p.t, powers[4] += t2 * t2;
+    right += p.offset * Eigen::Vector3d(1, p.t, t2);
+  }
+  Eigen::Matrix3d normal;
+  normal << powers[0], powers[1], powers[2], powers[1], powers[2], powers[3], powers[2], powers[3], powers[4];
+  CurveFit fit;
+  if (bent) {
+    const Eigen::Matrix3d inverse = normal.inverse();
+    fit.f = inverse * right;
+    fit.bend_sigma = std::sqrt(inverse(2, 2));
+  } else {
+    fit.f.head<2>() = normal.topLeftCorner<2, 2>().inverse() * right.head<2>();
+  }
+  for (const EdgePoint& p : points) {
+    const double r = p.offset - (fit.f[0] + p.t * (fit.f[1] + p.t * fit.f[2]));
+    fit.squared += r * r;
+  }
+  return fit;
+}
+
+/// Leaves out the points that lie farther than three sigmas off the curve.
+std::vector<EdgePoint> without_outliers(const std::vector<EdgePoint>& points, const CurveFit& fit) {
+  const double sigma = std::max(0.05, std::sqrt(fit.squared / static_cast<double>(points.size())));
+  std::vector<EdgePoint> kept;
+  for (const EdgePoint& p : points) {
+    if (std::abs(p.offset - (fit.f[0] + p.t * (fit.f[1] + p.t * fit.f[2]))) <= 3 * sigma) kept.push_back(p);
+  }
+  return kept;
+}
+
+/// The mean rise of the side's edge, grey levels; empty when there is none.
+std::optional<double> refine_side(GrayImage image, double length_px, double reach_px, int points_max, Side& side) {
+  constexpr int kPointsMin = 6, kPointsForBend = 16;
+  const double skipped = std::max(1.5, 0.08 * length_px);  // at the ends, where the other side's edge is near
+  const int count = std::clamp(static_cast<int>(length_px - 2 * skipped), kPointsMin, points_max);
+  std::vector<EdgePoint> points;
+  for (int i = 0; i < count; ++i) {
+    const double t = skipped + (length_px - 2 * skipped) * (i + 0.5) / count;
+    if (const auto point = edge_point(image, side, t, reach_px)) points.push_back(*point);
+  }
+  if (static_cast<int>(points.size()) * 2 < std::max(count, 2 * kPointsMin - 2)) return std::nullopt;
+  double rise = 0;
+  for (const EdgePoint& p : points) rise += p.rise / static_cast<double>(points.size());
+  CurveFit straight = fit_curve(points, false);
+  points = without_outliers(points, straight);
+  if (points.size() < 4) return std::nullopt;
+  straight = fit_curve(points, false);
+  side.f = straight.f;
+  if (static_cast<int>(points.size()) < kPointsForBend) return rise;
+  // Bent only where the bend is likely: a parabola's ends are half as sure as a line's, and a bend of 1.5 sigmas costs
+  // a line as much as that.
+  constexpr double kBendSigmas = 1.5;
+  const CurveFit bent = fit_curve(points, true);
+  const double sigma = std::sqrt(bent.squared / (static_cast<double>(points.size()) - 3));
+  if (std::abs(bent.f[2]) > kBendSigmas * sigma * bent.bend_sigma) side.f = bent.f;
+  return rise;
+}
+
+/// Where two sides meet near `start`: tangents crossed a few times.
+std::optional<Eigen::Vector2d> meeting(const Side& a, const Side& b, const Eigen::Vector2d& start) {
+  Eigen::Vector2d at = start;
+  for (int i = 0; i < 4; ++i) {
+    const double ta = (at - a.start).dot(a.along), tb = (at - b.start).dot(b.along);
+    const Eigen::Vector2d pa = a.point(ta), da = a.tangent(ta), pb = b.point(tb), db = b.tangent(tb);
+    const double parallel = cross(da, db);
+    if (std::abs(parallel) < 0.05) return std::nullopt;
+    at = pa + cross(pb - pa, db) / parallel * da;
+  }
+  return at;
+}
+
+}  // namespace
+
+double gray_between(GrayImage image, const Eigen::Vector2d& px) {
+  const double u = std::clamp(px.x(), 0.0, image.width - 1.0), v = std::clamp(px.y(), 0.0, image.height - 1.0);
+  const int u0 = std::min(static_cast<int>(u), image.width - 2), v0 = std::min(static_cast<int>(v), image.height - 2);
+  const double a = u - u0, b = v - v0;
+  const std::uint8_t* top = &image.at(u0, v0);
+  const std::uint8_t* low = top + image.width;
+  return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * low[0] + a * low[1]);
+}
+
+Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px) {
+  try {
+    cv::setNumThreads(1);  // results and memory must not depend on the number of cores
+    // OpenCV has no read-only header for foreign pixels; nothing writes to it.
+    return search(cv::Mat(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data)), side_min_px);
+  } catch (const cv::Exception& e) {
+    return failure(Fault::kBoardNotFound, "OpenCV: {}", e.err);
+  } catch (const std::bad_alloc&) {
+    return failure(Fault::kOutOfMemory, "searching markers in {}x{} pixels", image.width, image.height);
+  }
+}
+
+bool refine_quad(GrayImage image, double cell_px, QuadFit fit, Quad& quad) {
+  struct Round {
+    double widest_px;
+    int points_max;  ///< on a side
+  };
+  // Wide first, since contours are a pixel off; then narrow around what was found, the last time with all points. Only
+  // rises from dark to white count, so the border's inner edge does no harm.
+  constexpr std::array<Round, 3> kRounds = {{{3.0, 16}, {2.0, 16}, {1.5, 60}}};
+  std::array<Side, 4> sides;
+  for (const Round& round : std::span(kRounds).first(fit == QuadFit::kToRead ? 1 : kRounds.size())) {
+    const double reach_px = std::clamp(0.9 * cell_px, 1.5, round.widest_px);
+    double lowest = std::numeric_limits<double>::infinity(), highest = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector2d a = quad[i], b = quad[(i + 1) % 4];
+      const double length = (b - a).norm();
+      if (length < 4) return false;
+      const Eigen::Vector2d along = (b - a) / length;
+      // Clockwise with y down: outside is on the left of the way.
+      sides[i] = {a, along, {along.y(), -along.x()}};
+      const auto rise = refine_side(image, length, reach_px, round.points_max, sides[i]);
+      if (!rise) return false;
+      lowest = std::min(lowest, *rise), highest = std::max(highest, *rise);
+    }
+    // A weak side is the edge of something else that hides a part.
+    constexpr double kRiseShareMin = 0.65;
+    if (lowest < kRiseShareMin * highest) return false;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto corner = meeting(sides[(i + 3) % 4], sides[i], quad[i]);
+      if (!corner || (*corner - quad[i]).norm() > std::max(3.0, cell_px)) return false;
+      quad[i] = *corner;
+    }
+  }
+  return true;
+}
+
+}  // namespace firstlook
