@@ -8,6 +8,9 @@
 namespace firstlook {
 namespace {
 
+// A distorting lens moves neighbouring pixels apart by up to this factor.
+constexpr double kDistortionMax = 1.5;
+
 /// One frame, held against octants.
 class FrameProbe {
  public:
@@ -21,8 +24,7 @@ class FrameProbe {
     const double half_m = geometry.resolution_m / 4;  // of an octant's edge
     const Eigen::Matrix3d depth_R_base = depth_T_base_.rotation();
     half_depth_m_ = depth_R_base.row(2).cwiseAbs().sum() * half_m;
-    // Within its inscribed ball a ray crosses the octant for certain: half a pixel's diagonal must fit in.
-    far_m_ = 2 * half_m / std::hypot(1 / camera_.fx, 1 / camera_.fy);
+    beside_max_m_ = pinhole ? half_m : half_m / kDistortionMax;
     for (unsigned i = 0; i < middles_m_.size(); ++i) {
       middles_m_[i] = depth_R_base * Eigen::Vector3d((i & 1) != 0 ? half_m : -half_m, (i & 2) != 0 ? half_m : -half_m,
                                                      (i & 4) != 0 ? half_m : -half_m);
@@ -42,7 +44,7 @@ class FrameProbe {
 
  private:
   [[nodiscard]] bool is_crossed(const Eigen::Vector3d& middle_m) const {
-    if (middle_m.z() <= half_depth_m_ || middle_m.z() > far_m_) return false;
+    if (middle_m.z() <= half_depth_m_) return false;
     Eigen::Vector2d pixel(middle_m.x() / middle_m.z() * camera_.fx + camera_.cx,
                           middle_m.y() / middle_m.z() * camera_.fy + camera_.cy);
     if (!pinhole_) {
@@ -50,9 +52,14 @@ class FrameProbe {
       if (!projected) return false;
       pixel = *projected;
     }
-    if (!(pixel.x() > -0.5 && pixel.y() > -0.5)) return false;
-    const auto u = static_cast<int>(pixel.x() + 0.5), v = static_cast<int>(pixel.y() + 0.5);
+    if (!(pixel.x() > -0.5 && pixel.x() < image_.width() && pixel.y() > -0.5 && pixel.y() < image_.height()))
+      return false;
+    const auto u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
     if (u >= image_.width() || v >= image_.height()) return false;
+    // Within its inscribed ball the pixel's ray crosses the octant for certain.
+    const double beside_x_m = (u - pixel.x()) / camera_.fx * middle_m.z();
+    const double beside_y_m = (v - pixel.y()) / camera_.fy * middle_m.z();
+    if (beside_x_m * beside_x_m + beside_y_m * beside_y_m > beside_max_m_ * beside_max_m_) return false;
     return static_cast<double>(image_.at(u, v)) > middle_m.z() + half_depth_m_;
   }
 
@@ -63,7 +70,7 @@ class FrameProbe {
   Transform<Depth, Base> depth_T_base_;
   std::array<Eigen::Vector3d, 8> middles_m_;  ///< of the octants from the voxel's, camera axes
   double half_depth_m_ = 0;                   ///< from an octant's middle to its far corner, along the optical axis
-  double far_m_ = 0;                          ///< beyond this depth pixels are too coarse
+  double beside_max_m_ = 0;                   ///< from the octant's middle to the ray
 };
 
 }  // namespace

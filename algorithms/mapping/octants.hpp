@@ -27,7 +27,7 @@ namespace firstlook {
 }
 
 /// After a frame was applied: in the voxels that it passed and did not hit, notes each octant that the ray of the pixel
-/// at its middle crosses wholly. Where pixels are too coarse for that, octants stay as they were.
+/// nearest to its middle crosses, from one side of its inscribed ball to beyond the other.
 /// @param missed, hit  the planes of VoxelMap::apply
 /// @param image        the frame's reach, of every row
 /// @param pinhole      the sensor's lens does not distort (DepthRays::is_pinhole)

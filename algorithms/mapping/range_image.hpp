@@ -34,7 +34,8 @@ class RangeImage {
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] int tiles_x() const { return levels_.front().width; }
   [[nodiscard]] float at(int u, int v) const {
-    return tile(u / kTile, v / kTile)[static_cast<std::size_t>(v % kTile * kTile + u % kTile)];
+    return tile(u / kTile,
+                v / kTile)[static_cast<std::size_t>(v % kTile) * kTile + static_cast<std::size_t>(u % kTile)];
   }
   /// All pixels, tile by tile, each row by row.
   [[nodiscard]] std::span<const float> reach_m() const { return reach_m_; }

@@ -95,6 +95,11 @@ class VoxelMap {
   /// forget_known_free(), and every octant crossed by a ray since a surface was hit there.
   [[nodiscard]] bool known_free(std::size_t index, double now_s, double free_max_age_s) const;
 
+  /// Whether the latest frame that saw the voxel is too old at `at_s`.
+  [[nodiscard]] bool expires(std::size_t index, double at_s, double free_max_age_s) const {
+    return has_motion_planes() && at_s - static_cast<double>(seen_s_[index]) > free_max_age_s;
+  }
+
   /// One byte for each voxel, 1 where motion may be: known free or intact safe zone, and not blocked.
   /// @param out size() bytes
   void free_mask(double now_s, double free_max_age_s, std::span<std::uint8_t> out) const;

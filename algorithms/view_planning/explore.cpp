@@ -6,6 +6,7 @@
 
 #include "algorithms/kinematics/inverse_kinematics.hpp"
 #include "algorithms/view_planning/aim.hpp"
+#include "algorithms/view_planning/ray_walk.hpp"
 
 namespace firstlook {
 namespace {
@@ -15,6 +16,7 @@ constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each ca
 // states with less than 1 mm trap the arm).
 constexpr double kTargetMargin_m = 0.005;
 constexpr double kNearby_rad = 0.35;  // standard deviation of each joint around an earlier view
+constexpr int kAimedTries = 10;       // for one of another source: most are given up before they cost anything
 constexpr double kStandOffMin_m = 0.6;
 constexpr double kStandOffMax_m = 1.5;
 constexpr double kAimCone_rad = 1.2;  // about the direction from unknown to free: 70 degrees, beyond it is grazing
@@ -34,6 +36,18 @@ Eigen::Vector3d outward(const VoxelMap& map, std::uint32_t voxel) {
     }
   }
   return sum;
+}
+
+/// Whether nothing but free voxels lies between a point and the middle of a voxel.
+bool is_seen_from(const VoxelMap& map, const Eigen::Vector3d& eye, std::uint32_t voxel) {
+  const GridGeometry& geometry = map.geometry();
+  bool seen = true;
+  walk_ray(geometry, eye, geometry.center_m(geometry.voxel_at(voxel)), [&](std::size_t i, double) {
+    if (i == voxel) return false;
+    seen = map.voxel_class(i) == VoxelClass::kFree && !map.holds_surface(i);
+    return seen;
+  });
+  return seen;
 }
 
 double largest_joint_distance(const JointVector& a, const JointVector& b) { return (a - b).max_abs(); }
@@ -96,12 +110,17 @@ bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointV
   const std::uint32_t voxel = frontier[static_cast<std::size_t>(pick)];
   const Eigen::Vector3d out = outward(c.map, voxel);
   const Eigen::Vector3d axis = out.norm() > 1e-9 ? Eigen::Vector3d(out.normalized()) : random.direction();
-  const Eigen::Vector3d direction = direction_within(axis, kAimCone_rad, random);
-  const double near_m = std::max(kStandOffMin_m, gain_.sensor().range_min_m + 0.05);
-  const double distance_m = random.uniform(near_m, std::max(near_m, kStandOffMax_m));
   const Eigen::Vector3d target = c.map.geometry().center_m(c.map.geometry().voxel_at(voxel));
-  const auto base_T_depth = look_at<Depth>(target, direction, distance_m, random.uniform(0, 2 * std::numbers::pi));
-  if (c.space.margin_m(base_T_depth.translation(), c.clearance) < 0) return false;
+  // From a place that the sensor has in a random configuration: of places drawn around the target few can be reached.
+  const Eigen::Vector3d eye = (forward(c.arm, draw_random(task, random)).flange() * c.flange_T_depth).translation();
+  const Eigen::Vector3d to_eye = eye - target;
+  const double distance_m = to_eye.norm();
+  const double near_m = std::max(kStandOffMin_m, gain_.sensor().range_min_m + 0.05);
+  if (distance_m < near_m || distance_m > std::max(near_m, kStandOffMax_m)) return false;
+  if (to_eye.dot(axis) < std::cos(kAimCone_rad) * distance_m) return false;
+  if (c.space.margin_m(eye, c.clearance) < 0 || !is_seen_from(c.map, eye, voxel)) return false;
+  const auto base_T_depth =
+      look_at<Depth>(target, to_eye / distance_m, distance_m, random.uniform(0, 2 * std::numbers::pi));
   double nearest_rad = 1e9;
   for (const JointVector& q : inverse(c.arm, base_T_depth * task.depth_T_flange, task.current)) {
     const double distance_rad = largest_joint_distance(q, task.current);
@@ -120,7 +139,8 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
   // An ordinary choice takes turns; the certificate's first half is random, its second half aimed.
   const int source = task.certificate ? (index < task.samples ? 0 : 2) : index % 3;
   out = Candidate{};
-  while (!out.free && out.tries < task.options.tries_per_candidate) {
+  const int tries_max = task.options.tries_per_candidate * (source == 2 ? kAimedTries : 1);
+  while (!out.free && out.tries < tries_max) {
     ++out.tries;
     if (source == 2) {
       out.free = draw_aimed(task, index - (task.certificate ? task.samples : 0), random, out.q);

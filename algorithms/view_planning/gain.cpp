@@ -20,10 +20,13 @@ VoxelClass class_for_looking(const VoxelMap& map, std::size_t index) {
   return voxel == VoxelClass::kFree && map.holds_surface(index) ? VoxelClass::kOccupied : voxel;
 }
 
-/// Free in the map, but motion cannot use it: seen from one pose only, too long ago, or doubted by the latest frame.
+/// Free in the map, but motion cannot use it: seen from one pose only, in part, doubted by the latest frame, or so long
+/// ago that it soon cannot.
 bool needs_again(const ViewContext& context, std::size_t index) {
-  return context.space.field != nullptr && class_for_looking(context.map, index) == VoxelClass::kFree &&
-         context.space.field->values()[index] <= 0 && !context.map.blocked(index);
+  if (context.space.field == nullptr || class_for_looking(context.map, index) != VoxelClass::kFree) return false;
+  if (context.map.blocked(index)) return false;
+  return context.space.field->values()[index] <= 0 ||
+         context.map.expires(index, context.fresh_until_s, context.free_max_age_s);
 }
 
 /// Whether a capsule in base coordinates can come between the sensor and any of its rays: it is not the sensor's own

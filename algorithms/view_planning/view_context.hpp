@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "algorithms/kinematics/speed.hpp"
@@ -21,6 +22,9 @@ struct ViewContext {
   const VoxelMap& map;
   std::span<const std::uint8_t> zone;  ///< mark_reach_zone: the voxels whose knowledge counts
   Transform<Flange, Depth> flange_T_depth;
+  /// Free voxels that motion could not use at this time any more want another look before it comes (safety rule 1).
+  double fresh_until_s = 0;
+  double free_max_age_s = std::numeric_limits<double>::infinity();
 };
 
 /// What a view has to cost beside the move, and how fast the arm may be: the denominator of utility.
@@ -33,9 +37,9 @@ struct ViewTiming {
 /// What a look from one place is expected to tell.
 struct ViewGain {
   std::uint32_t unknown = 0;  ///< unknown voxels of the zone, each once: what coverage counts
-  std::uint32_t again = 0;    ///< seen free once, but motion needs a second pose (safety rule 1)
+  std::uint32_t again = 0;    ///< free, but motion cannot use them, or not for long (safety rule 1)
 
-  /// A voxel that needs its second look is half known for motion: it weighs a quarter of one that was never seen.
+  /// A voxel that needs another look is half known for motion: it weighs a quarter of one that was never seen.
   [[nodiscard]] double weight() const { return unknown + 0.25 * again; }
 };
 

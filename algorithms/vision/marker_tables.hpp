@@ -1,6 +1,6 @@
 /// The cells of ArUco's and AprilTag's markers, as public dictionaries publish them (ArUco: Garrido-Jurado et al. 2014;
-/// AprilTag: Olson 2011), read from OpenCV 4.6's tables. Row by row from the upper left, first cell in the highest bit, 1
-/// is white. A test compares them with OpenCV.
+/// AprilTag: Olson 2011), read from OpenCV 4.6's tables. Row by row from the upper left, first cell in the highest bit,
+/// 1 is white. A test compares them with OpenCV.
 #pragma once
 
 #include <cstdint>

@@ -76,8 +76,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   calibrate_app->add_option(
       "--solver", calibrate.solver,
       fmt::format("what starts the refinement (park-martin): {}", fmt::join(solver_names(), ", ")));
-  calibrate_app->add_option("--detector", calibrate.detector,
-                            "settings of the checkerboard's detection: default, thesis2014 (table D-8), ...")
+  calibrate_app
+      ->add_option("--detector", calibrate.detector,
+                   "settings of the checkerboard's detection: default, thesis2014 (table D-8), ...")
       ->capture_default_str();
   calibrate_app->add_flag("--strict", calibrate.strict, "exit with 5 when the calibration is rejected");
   calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");

@@ -10,6 +10,9 @@ namespace {
 constexpr double kFieldMax_m = 0.6;     // farther is as good as free: the largest body radius and clearance are below
 constexpr double kZoneMargin_m = 0.10;  // stopping distance and a voxel, as the reach zone wants
 constexpr std::size_t kViewRecordsMax = 512;
+// Known free space that expires within this share of its greatest age wants a look: a few views renew all of it, and a
+// job that lasts longer does not find its way back closed.
+constexpr double kFreshShareOfAge = 1.0 / 3;
 constexpr double kRoomToSpare_m = 0.015;  // beyond rule 5 when there is a choice: surfaces flicker by parts of a voxel
 constexpr double kSlowSpeed_m_s = 0.05;   // stops within 1.3 mm instead of 16.5
 
@@ -228,8 +231,16 @@ void Workbench::revoke_zone() {
 }
 
 ViewContext Workbench::context(const Clearance& clearance) const {
-  return {
-      arm_, camera_body_, mapping_space_, clearance, map_, zone_, hand_eye_->flange_T_camera * facts_.camera_T_depth};
+  const double max_age_s = config_.map.free_max_age_s;
+  return {arm_,
+          camera_body_,
+          mapping_space_,
+          clearance,
+          map_,
+          zone_,
+          hand_eye_->flange_T_camera * facts_.camera_T_depth,
+          last_stamp_s_ + kFreshShareOfAge * max_age_s,
+          max_age_s};
 }
 
 }  // namespace firstlook

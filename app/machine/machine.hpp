@@ -44,7 +44,6 @@ struct Progress {
   std::uint32_t steps = 0;         ///< of the current state: seeds its candidates
   std::uint32_t sweep_views = 0;
   std::uint32_t explore_views = 0;
-  std::optional<Instant> mapping_started;
   std::uint32_t replans = 0;        ///< in a row, without a view between
   std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
   bool calibration_accepted = false;

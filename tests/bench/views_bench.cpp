@@ -53,7 +53,7 @@ class MappedWorkshop {
     sensor.intrinsics = renderer_.depth_intrinsics(sim::DepthDetail::kFast);
     return sensor;
   }
-  [[nodiscard]] ViewContext context() const { return {arm_, body_, space_, clearance_, map_, zone_, mount()}; }
+  [[nodiscard]] ViewContext context() const { return {arm_, body_, space_, clearance_, map_, zone_, mount(), 0, 600}; }
   [[nodiscard]] const GridGeometry& geometry() const { return geometry_; }
   [[nodiscard]] const JointVector& joints() const { return q_; }
 

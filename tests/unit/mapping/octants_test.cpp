@@ -168,21 +168,32 @@ TEST_CASE("speckle in free space does not block it for longer than the next look
   CHECK(left == 0);
 }
 
-TEST_CASE("pixels too coarse to be sure of an octant leave its surface", "[mapping]") {
+TEST_CASE("an octant between the rays of coarse pixels keeps its surface until a ray comes through", "[mapping]") {
   Scene scene;
   DepthCamera camera;
-  VoxelMap fine(GridGeometry::covering({-0.5, -0.5, -0.2}, {1.95, 0.5, 0.8}, 0.01));  // half an octant: 2.5 mm
+  // Half an octant is 2.5 mm; rays are 6 mm apart at the panel.
+  VoxelMap fine(GridGeometry::covering({-0.5, -0.5, -0.2}, {1.95, 0.5, 0.8}, 0.01));
   Inserter inserter(fine.geometry(), camera.sensor);
+  const auto surfaces = [&fine] {
+    std::size_t n = 0;
+    for_panel(fine, Scene{}, [&](std::size_t i) { n += fine.holds_surface(i) ? 1 : 0; });
+    return n;
+  };
   double stamp_s = 1;
   frontal_looks(fine, inserter, camera, scene, stamp_s);
-  std::size_t surfaces = 0, left = 0;
-  for (std::size_t i = 0; i < fine.size(); ++i) surfaces += fine.holds_surface(i) ? 1 : 0;
+  const std::size_t before = surfaces();
   scene.panel_there = false;
-  for (int i = 0; i < 6; ++i) frontal_looks(fine, inserter, camera, scene, stamp_s);
-  for (std::size_t i = 0; i < fine.size(); ++i) left += fine.holds_surface(i) ? 1 : 0;
-  // A pixel is 7 mm wide at the panel: 4 mm from its middle to its corner.
-  CHECK(surfaces > 1000);
-  CHECK(left >= surfaces);
+  const auto one_pose = looking({0.2, 0.0, 0.25}, {1, 0, 0});
+  for (int i = 0; i < 6; ++i) REQUIRE(inserter.insert(fine, camera.look(scene, one_pose), one_pose, {}, stamp_s++));
+  const std::size_t from_one_pose = surfaces();
+  for (int i = 0; i < 60; ++i) {
+    const auto pose = looking({0.2, 0.0013 * i, 0.25 + 0.0017 * i}, {1, 0, 0});
+    REQUIRE(inserter.insert(fine, camera.look(scene, pose), pose, {}, stamp_s++));
+  }
+  CHECK(before > 20);
+  CHECK(from_one_pose > before / 10);
+  CHECK(from_one_pose < before);
+  CHECK(surfaces() == 0);
 }
 
 TEST_CASE("a map of log-odds alone keeps no octants", "[mapping]") {

@@ -107,7 +107,7 @@ struct SmallWorld {
       if (space.zone.depth_m(p) > 0.05 && map.voxel_class(i) == VoxelClass::kOccupied) space.zone_intact = false;
     }
   }
-  ViewContext context() const { return {arm, body, space, clearance, map, zone, mount}; }
+  ViewContext context() const { return {arm, body, space, clearance, map, zone, mount, 0, 600}; }
 
   FrameChange look(const JointVector& at) {
     const auto base_T_depth = forward(arm, at).flange() * mount;
