@@ -26,7 +26,7 @@ constexpr std::array<Size, 3> kSizes = {{{640, 480}, {1280, 1024}, {1920, 1200}}
 /// The thesis's colour camera with more pixels.
 CameraIntrinsics camera_of(const Size& size) {
   const double f = 534.78 * size.width / 640;
-  return {size.width, size.height, f,      f, size.width / 2 - 10.0, size.height / 2 - 7.0, .04586,
+  return {size.width, size.height, f,      f, 0.5 * size.width - 10, 0.5 * size.height - 7, .04586,
           -.1301,     .0025,       -.0006, 0};
 }
 
@@ -64,7 +64,7 @@ test::DrawnImage tiles(const Size& size) {
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       const double gray = ((u / 12 + v / 12) % 2 == 0 ? 200 : 40) + 4 * random.normal();
-      image.pixels[static_cast<std::size_t>(v * size.width + u)] =
+      image.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(size.width) + static_cast<std::size_t>(u)] =
           static_cast<std::uint8_t>(std::clamp(std::lround(gray), 0L, 255L));
     }
   }
@@ -128,14 +128,16 @@ void add_rows(const std::string& name, const test::DrawnImage& image, const Boar
     // The peers may take seconds where nothing is to be found.
     const int rounds = options.amount(1, 3, 9);
     const bool asked = peer.find && is_asked(board, name);
+    bool again = false;
     const auto seconds = medians_taking_turns(
-        rounds, [&] { (void)detect_target(image.view(), board); },
+        rounds, [&] { again = detect_target(image.view(), board).has_value(); },
         [&] {
           if (asked) peer.find(mat);
         });
     const auto theirs = asked ? std::optional(1e3 * seconds[1]) : std::nullopt;
     Row row = timed(name, 1e3 * seconds[0], "ms", asked ? peer.title : "", theirs, goal);
-    if (found != there) row.void_because = there ? "the board was not found" : "a board was found that is not there";
+    if (found != there || again != there)
+      row.void_because = there ? "the board was not found" : "a board was found that is not there";
     report.add(row);
   }
 }
