@@ -85,7 +85,8 @@ bool next_combination(std::span<const OpenView> views, const std::array<std::siz
                       std::array<std::size_t, 4>& choices) {
   for (std::size_t k = 0; k < four.size(); ++k) {
     const auto& open = views[four[k]].choices;
-    if (++choices[k] < open.size() && !(k == 0 && open[choices[k]].reversed)) return true;
+    ++choices[k];
+    if (choices[k] < open.size() && !(k == 0 && open[choices[k]].reversed)) return true;
     choices[k] = 0;
   }
   return false;

@@ -28,7 +28,9 @@ class PointIndex {
     const int r0 = row(at.y() - radius_px), r1 = row(at.y() + radius_px);
     for (int r = r0; r <= r1; ++r) {
       for (int c = c0; c <= c1; ++c) {
-        for (const std::size_t p : buckets_[static_cast<std::size_t>(r * columns_ + c)]) visit(p);
+        for (const std::size_t p :
+             buckets_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)])
+          visit(p);
       }
     }
   }

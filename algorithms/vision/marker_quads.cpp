@@ -253,7 +253,7 @@ bool refine_quad(GrayImage image, double cell_px, QuadFit fit, Quad& quad) {
     const double reach_px = std::clamp(0.9 * cell_px, 1.5, round.widest_px);
     double lowest = std::numeric_limits<double>::infinity(), highest = 0;
     for (std::size_t i = 0; i < 4; ++i) {
-      const Eigen::Vector2d a = quad[i], b = quad[(i + 1) % 4];
+      const Eigen::Vector2d &a = quad[i], &b = quad[(i + 1) % 4];
       const double length = (b - a).norm();
       if (length < 4) return false;
       const Eigen::Vector2d along = (b - a) / length;

@@ -26,7 +26,9 @@ struct CellGrays {
   std::vector<double> gray;        ///< row by row
   double paper = 0;                ///< mean of all sides
   std::array<double, 4> beside{};  ///< the paper along each side
-  [[nodiscard]] double at(int column, int row) const { return gray[static_cast<std::size_t>(row * cells + column)]; }
+  [[nodiscard]] double at(int column, int row) const {
+    return gray[static_cast<std::size_t>(row) * static_cast<std::size_t>(cells) + static_cast<std::size_t>(column)];
+  }
 };
 
 std::optional<CellGrays> read_cells(GrayImage image, const Quad& quad, int cells) {
@@ -324,7 +326,8 @@ Result<CornerSet> charuco_corners(GrayImage image, const BoardSpec& board, const
         const int c = column + (k == 1 || k == 2 ? 1 : 0), r = row + (k >= 2 ? 1 : 0);
         if (c < 0 || r < 0 || c >= board.inner_columns || r >= board.inner_rows) continue;
         if (((*square)[k] - start[k]).norm() > std::max(2.0, 0.15 * side)) continue;
-        seen[static_cast<std::size_t>(r * board.inner_columns + c)].push_back((*square)[k]);
+        seen[static_cast<std::size_t>(r) * static_cast<std::size_t>(board.inner_columns) + static_cast<std::size_t>(c)]
+            .push_back((*square)[k]);
       }
     }
   }

@@ -17,6 +17,7 @@ struct Topic {
 };
 constexpr Topic kTopics[] = {
     {"calibration", firstlook::bench::bench_calibration},
+    {"detection", firstlook::bench::bench_detection},
     {"map", firstlook::bench::bench_map},
     {"gain", firstlook::bench::bench_gain},
     {"motion", firstlook::bench::bench_motion},

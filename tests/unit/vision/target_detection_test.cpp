@@ -127,6 +127,31 @@ TEST_CASE("boards of markers may be half hidden, the others may not", "[vision][
   }
 }
 
+TEST_CASE("half a board of markers gives the pose, whichever half is hidden", "[vision][target]") {
+  for (const Case& c : kCases) {
+    if (!c.board.allows_partial_views() || c.board.markers() < 2) continue;
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      Random random(seed, 12);
+      const Pose pose = look_at_board(c.board, random.uniform(.45, .55), random.uniform(0, 30) * kDegree,
+                                      random.uniform(0, 6.28), random.uniform(0, 6.28));
+      const InkExtent ink = ink_extent(c.board);
+      const double angle = random.uniform(0, 6.28);
+      const Eigen::Vector2d across(std::cos(angle), std::sin(angle));
+      DrawOptions options{30, 220, random.uniform(20, 230), 2, seed, 0.6, {}};
+      options.hidden = [&](const Eigen::Vector2d& p) { return across.dot(p - ink.center_m) > 0; };
+      const auto found = detect_target(draw_board(kCamera, c.board, pose, options).view(), c.board);
+      CAPTURE(c.name, seed);
+      if (c.board.markers() > 9 || found) REQUIRE(found);  // of nine, half a board may leave two
+      if (!found) continue;
+      const auto seen = estimate_board_pose_robust(kCamera, c.board, *found);
+      REQUIRE(seen);
+      const Eigen::Vector3d middle = c.board.center();
+      CHECK((seen->pose.camera_T_board * middle - pose * middle).norm() < 0.005);
+      CHECK(Eigen::AngleAxisd(seen->pose.camera_T_board.rotation() * pose.linear().transpose()).angle() < 0.02);
+    }
+  }
+}
+
 TEST_CASE("one target is not taken for another, nor a picture of nothing", "[vision][target]") {
   std::vector<std::uint8_t> noise(640 * 480);
   Random random(3);
