@@ -180,8 +180,9 @@ void check_covariance(const Section& section, const Matrix6d& covariance) {
 Matrix6d read_covariance(const Section& section) {
   const auto values = section.numbers<36>("covariance", -1e12, 1e12);
   Matrix6d covariance;
+  std::size_t next = 0;
   for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) covariance(i, j) = values[static_cast<std::size_t>(6 * i + j)];
+    for (int j = 0; j < 6; ++j) covariance(i, j) = values[next++];
   }
   check_covariance(section, covariance);
   const auto mm = section.numbers<3>("sigma_translation_mm", 0, 1e9);
@@ -368,7 +369,7 @@ Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file) {
   const Result<std::string> text = read_text_file(name, kFileBytesMax);
   if (!text) return std::unexpected(text.error());
   try {
-    const StoredCalibration calibration = parse(YAML::Load(*text));
+    StoredCalibration calibration = parse(YAML::Load(*text));
     if (!calibration.accepted) {
       return failure(Fault::kStoredCalibration, "{}: rejected by the run that made it", name);
     }
