@@ -10,8 +10,8 @@ namespace {
 // Occupied voxels that no box covers yet.
 class Uncovered {
  public:
-  explicit Uncovered(const VoxelMap& map) : geometry_(map.geometry()), open_(map.size(), false) {
-    for (std::size_t i = 0; i < map.size(); ++i) open_[i] = map.voxel_class(i) == VoxelClass::kOccupied;
+  Uncovered(const VoxelMap& map, ClassReading reading) : geometry_(map.geometry()), open_(map.size(), false) {
+    for (std::size_t i = 0; i < map.size(); ++i) open_[i] = reading(map, i) == VoxelClass::kOccupied;
   }
   [[nodiscard]] bool at(std::size_t index) const { return open_[index]; }
   // True when every voxel of the block from low to high (exclusive) is open.
@@ -39,9 +39,9 @@ class Uncovered {
 
 }  // namespace
 
-std::vector<AxisBox> merge_occupied(const VoxelMap& map) {
+std::vector<AxisBox> merge_occupied(const VoxelMap& map, ClassReading reading) {
   const GridGeometry& g = map.geometry();
-  Uncovered uncovered(map);
+  Uncovered uncovered(map, reading);
   std::vector<AxisBox> boxes;
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (!uncovered.at(i)) continue;

@@ -77,9 +77,14 @@ std::array<NodeState, 8> children_of(const Leaves& leaves, const Node& node) {
   return children;
 }
 
-// Cuts the map at a depth. With `classes_only` every known value becomes one of two, so that blocks of a class are
-// equal.
-Leaves cut(const VoxelMap& map, int depth, bool classes_only) {
+// One of two values for each class, so that blocks of a class are equal.
+std::int8_t value_of(VoxelClass voxel_class) {
+  if (voxel_class == VoxelClass::kUnknown) return kUnknownLogOdds;
+  return voxel_class == VoxelClass::kOccupied ? 1 : 0;
+}
+
+// Cuts the map at a depth: log-odds, or classes when there is a reading of them.
+Leaves cut(const VoxelMap& map, int depth, ClassReading reading) {
   const GridGeometry& g = map.geometry();
   const int shift = kOctreeDepth - depth;
   Leaves leaves;
@@ -97,9 +102,8 @@ Leaves cut(const VoxelMap& map, int depth, bool classes_only) {
   for (int z = 0; z < g.size.z(); ++z) {
     for (int y = 0; y < g.size.y(); ++y) {
       for (int x = 0; x < g.size.x(); ++x, ++index) {
-        std::int8_t value = map.log_odds(index);
+        const std::int8_t value = reading == nullptr ? map.log_odds(index) : value_of(reading(map, index));
         if (value == kUnknownLogOdds) continue;
-        if (classes_only) value = value >= 0 ? 1 : 0;
         const auto i = static_cast<std::size_t>(((first.x() + x) >> shift) - leaves.first.x());
         const auto j = static_cast<std::size_t>(((first.y() + y) >> shift) - leaves.first.y());
         const auto k = static_cast<std::size_t>(((first.z() + z) >> shift) - leaves.first.z());
@@ -166,9 +170,9 @@ void write_full_node(const Leaves& leaves, const Node& node, const NodeState& st
 
 }  // namespace
 
-void write_bt(const VoxelMap& map, int depth, ByteSink sink) {
+void write_bt(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink) {
   ENSURE(3051, depth >= 1 && depth <= kOctreeDepth);
-  const Leaves leaves = cut(map, depth, true);
+  const Leaves leaves = cut(map, depth, reading);
   const Node root{Eigen::Vector3i::Zero(), 0};
   const bool empty = state_of(leaves, root).shape == Shape::kAbsent;
   write_header("binary ", map, empty ? 0 : count_nodes(leaves, root), sink);
@@ -177,7 +181,7 @@ void write_bt(const VoxelMap& map, int depth, ByteSink sink) {
 
 void write_ot(const VoxelMap& map, int depth, ByteSink sink) {
   ENSURE(3053, depth >= 1 && depth <= kOctreeDepth);
-  const Leaves leaves = cut(map, depth, false);
+  const Leaves leaves = cut(map, depth, nullptr);
   const Node root{Eigen::Vector3i::Zero(), 0};
   const NodeState state = state_of(leaves, root);
   const bool empty = state.shape == Shape::kAbsent;

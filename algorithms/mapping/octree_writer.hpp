@@ -2,6 +2,7 @@
 #pragma once
 
 #include "algorithms/mapping/byte_sink.hpp"
+#include "algorithms/mapping/class_reading.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 
 namespace firstlook {
@@ -9,12 +10,12 @@ namespace firstlook {
 inline constexpr int kOctreeDepth = 16;  ///< OctoMap's: leaves at this depth are one voxel
 
 /// `.bt`: free and occupied only. Equal blocks are pruned as OctoMap prunes.
-/// @param depth  1..16: nodes are cut there, and a cut node is the largest value of its known voxels, as OctoMap's
-/// inner
-///               nodes are (a block of free and unknown voxels reads as free); ENSURE otherwise
-void write_bt(const VoxelMap& map, int depth, ByteSink sink);
+/// @param reading  collision_class for a map to plan with, octomap_class for what map.ot says
+/// @param depth    1..16: nodes are cut there, and a cut node is the largest value of its known voxels, as OctoMap's
+///                 inner nodes are (a block of free and unknown voxels reads as free); ENSURE otherwise
+void write_bt(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink);
 
-/// `.ot`: with log-odds in OctoMap's units; depth as above.
+/// `.ot`: with log-odds in OctoMap's units, which know nothing of octants; depth as above.
 void write_ot(const VoxelMap& map, int depth, ByteSink sink);
 
 }  // namespace firstlook

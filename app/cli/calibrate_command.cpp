@@ -6,11 +6,14 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/dataset/calibration_dataset.hpp"
+#include "app/report/calibration_files.hpp"
 #include "app/report/hand_eye_json.hpp"
 #include "app/report/ros_files.hpp"
+#include "app/report/run_files.hpp"
 
 namespace firstlook {
 namespace {
@@ -77,6 +80,23 @@ void print_text(const HandEyeResult& r) {
   for (const std::string& reason : r.reasons) fmt::print("  {}\n", reason);
 }
 
+Status write_files(const CalibrateCommandOptions& options, const CalibrationDataset& data, const HandEyeResult& result,
+                   const HandEyeOptions& hand_eye) {
+  const std::string_view arm = options.arm.empty() ? kUnknownArm : std::string_view(options.arm);
+  StoredCalibration calibration = stored_calibration(result, solver_name(hand_eye.solver), arm);
+  if (data.source != CalibrationSource::kPairs) calibration.intrinsics = data.camera;
+  std::vector<NamedFile> files = calibration_files(calibration);
+  if (calibration.intrinsics.width > 0) {
+    files.push_back({"camera_info.yaml", camera_info_yaml(calibration.intrinsics)});
+  }
+  if (Status written = write_named_files(options.out, files); !written) return written;
+  fmt::print(stderr, "{}: {}\n", options.out,
+             calibration.accepted ? "hand_eye.yaml and what ROS loads, in ros/"
+                                  : "hand_eye.yaml, which says that it is rejected; nothing for ROS is made of it");
+  if (arm == kUnknownArm) fmt::print(stderr, "without --arm no job takes hand_eye.yaml up again\n");
+  return {};
+}
+
 }  // namespace
 
 int run_calibrate_command(const CalibrateCommandOptions& options) {
@@ -98,6 +118,13 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
     fmt::print(stderr, "unknown detector '{}': {}\n", options.detector, fmt::join(detector_preset_names(), ", "));
     return kUsageError;
   }
+  if (!options.arm.empty() && !find_arm_model(options.arm)) {
+    fmt::print(stderr, "unknown arm '{}': ur3, ur5, ur10, ur3e, ur5e, ur10e\n", options.arm);
+    return kUsageError;
+  }
+  if (!options.out.empty()) {
+    if (const Status fresh = check_run_folder(options.out); !fresh) return fail(fresh.error(), kDataError);
+  }
   const auto data = read_calibration_dataset(options.dataset, preset->detection);
   if (!data) return fail(data.error(), kDataError);
   narrate(*data);
@@ -106,6 +133,9 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
                           : calibrate_hand_eye(data->camera, data->board, data->views, hand_eye);
   if (!result) return fail(result.error(), kDataError);
   narrate_views(*data, *result);
+  if (!options.out.empty()) {
+    if (const Status s = write_files(options, *data, *result, hand_eye); !s) return fail(s.error(), kDataError);
+  }
   if (options.json) {
     fmt::print("{}\n", hand_eye_json(*result, kFlangeFrame, solver_name(hand_eye.solver)).dump(2));
   } else {

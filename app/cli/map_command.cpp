@@ -117,7 +117,8 @@ Status write_map_files(const VoxelMap& map, const std::filesystem::path& folder)
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return failure(Fault::kDiskWrite, "{}: {}", folder.string(), error.message());
-  Status status = write_file(folder / "collision_map.bt", [&](ByteSink sink) { write_bt(map, kOctreeDepth, sink); });
+  Status status = write_file(folder / "collision_map.bt",
+                             [&](ByteSink sink) { write_bt(map, collision_class, kOctreeDepth, sink); });
   if (status) status = write_file(folder / "map.ot", [&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); });
   if (status) status = write_file(folder / "map.ply", [&](ByteSink sink) { write_ply(map, false, sink); });
   return status;

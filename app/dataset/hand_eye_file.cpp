@@ -14,6 +14,7 @@
 #include "algorithms/vision/camera_model.hpp"
 #include "app/config/nearest_name.hpp"
 #include "app/report/ros_files.hpp"
+#include "app/report/yaml_number.hpp"
 #include "platform/journal/journal.hpp"
 #include "platform/linux/files.hpp"
 
@@ -142,11 +143,11 @@ Transform<A, B> read_transform(const Section& section) {
     }
   }
   const auto t = section.numbers<3>("translation_m", -kTranslationMax_m, kTranslationMax_m);
-  const auto q = section.numbers<4>("quaternion_xyzw", -1.001, 1.001);
+  const auto q = section.numbers<4>("quaternion_xyzw", -1e9, 1e9);
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   if (std::abs(rotation.norm() - 1) > 1e-6) {
     complain(section.child("quaternion_xyzw"),
-             fmt::format("quaternion_xyzw has the norm {:.7f} instead of 1: copy all digits", rotation.norm()));
+             fmt::format("quaternion_xyzw has the norm {:.7g} instead of 1: copy all digits", rotation.norm()));
   }
   return {rotation, Eigen::Vector3d(t[0], t[1], t[2])};
 }
@@ -179,8 +180,9 @@ void check_covariance(const Section& section, const Matrix6d& covariance) {
 Matrix6d read_covariance(const Section& section) {
   const auto values = section.numbers<36>("covariance", -1e12, 1e12);
   Matrix6d covariance;
+  std::size_t next = 0;
   for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) covariance(i, j) = values[static_cast<std::size_t>(6 * i + j)];
+    for (int j = 0; j < 6; ++j) covariance(i, j) = values[next++];
   }
   check_covariance(section, covariance);
   const auto mm = section.numbers<3>("sigma_translation_mm", 0, 1e9);
@@ -241,6 +243,11 @@ StoredCalibration parse(const YAML::Node& root) {
     complain(s.child("verdict"), "verdict must be accepted or rejected");
   c.accepted = verdict == "accepted";
   if (!c.accepted) return c;  // its figures are whatever made it be rejected
+  if (s.text("parent_frame") == kCameraFrame && s.text("child_frame") == kFlangeFrame) {
+    complain(s.child("parent_frame"),
+             fmt::format("parent_frame and child_frame are swapped: the pose of {} in {} is wanted, not its inverse",
+                         kCameraFrame, kFlangeFrame));
+  }
   require_word(s, "parent_frame", kFlangeFrame);
   require_word(s, "child_frame", kCameraFrame);
   c.arm_model = s.text("arm_model");
@@ -249,9 +256,10 @@ StoredCalibration parse(const YAML::Node& root) {
   c.covariance = read_covariance(s);
   c.corner_sigma_px = s.number("corner_sigma_px", 0, 100);
   c.arm_sigma = {s.number("arm_sigma_mm", 0, 100) * 1e-3, s.number("arm_sigma_mrad", 0, 100) * 1e-3};
-  c.intrinsics = read_intrinsics(s.child("intrinsics"));
-  c.camera_T_depth =
-      read_transform<Camera, Depth>(Section(s.child("camera_T_depth"), "camera_T_depth", kTransformKeys));
+  if (!s.child("intrinsics").IsNull()) c.intrinsics = read_intrinsics(s.child("intrinsics"));
+  if (const YAML::Node depth = s.child("camera_T_depth"); !depth.IsNull()) {
+    c.camera_T_depth = read_transform<Camera, Depth>(Section(depth, "camera_T_depth", kTransformKeys));
+  }
   c.solver = s.text("solver");
   if (!find_solver(c.solver)) complain(s.child("solver"), fmt::format("solver '{:.40}' is not known", c.solver));
   c.views = s.whole("views", 3, 100000);
@@ -265,7 +273,7 @@ StoredCalibration parse(const YAML::Node& root) {
 template <typename Vector>
 std::string list(const Vector& v) {
   std::string text;
-  for (Eigen::Index i = 0; i < v.size(); ++i) text += fmt::format("{}{}", i == 0 ? "" : ", ", v(i));
+  for (Eigen::Index i = 0; i < v.size(); ++i) text += fmt::format("{}{}", i == 0 ? "" : ", ", yaml_number(v(i)));
   return "[" + text + "]";
 }
 
@@ -275,11 +283,26 @@ Eigen::Vector4d quaternion_xyzw(const Eigen::Quaterniond& rotation) {
   return q.w() < 0 ? Eigen::Vector4d(-q.coeffs()) : Eigen::Vector4d(q.coeffs());
 }
 
+std::string intrinsics_text(const CameraIntrinsics& k) {
+  if (k.width == 0) return "intrinsics: null\n";
+  const auto n = yaml_number;
+  return fmt::format(
+      "intrinsics: {{image_width: {}, image_height: {}, fx_px: {}, fy_px: {}, cx_px: {}, cy_px: {},\n"
+      "             k1: {}, k2: {}, p1: {}, p2: {}, k3: {}}}\n",
+      k.width, k.height, n(k.fx), n(k.fy), n(k.cx), n(k.cy), n(k.k1), n(k.k2), n(k.p1), n(k.p2), n(k.k3));
+}
+
+std::string depth_text(const std::optional<Transform<Camera, Depth>>& camera_T_depth) {
+  if (!camera_T_depth) return "camera_T_depth: null\n";
+  return fmt::format("camera_T_depth:\n  translation_m: {}\n  quaternion_xyzw: {}\n",
+                     list(camera_T_depth->translation()), list(quaternion_xyzw(camera_T_depth->quaternion())));
+}
+
 std::string covariance_text(const Matrix6d& covariance) {
   std::string text;
   for (int i = 0; i < 6; ++i) {
     text += i == 0 ? "\n  [" : ",\n   ";
-    for (int j = 0; j < 6; ++j) text += fmt::format("{}{}", j == 0 ? "" : ", ", covariance(i, j));
+    for (int j = 0; j < 6; ++j) text += fmt::format("{}{}", j == 0 ? "" : ", ", yaml_number(covariance(i, j)));
   }
   return text + "]";
 }
@@ -301,10 +324,12 @@ std::uint64_t kinematics_checksum(const ArmModel& arm) {
 }
 
 std::string hand_eye_yaml(const StoredCalibration& c) {
-  const CameraIntrinsics& k = c.intrinsics;
   const Vector6d sigmas = c.covariance.diagonal().cwiseMax(0).cwiseSqrt() * 1e3;
+  const auto n = yaml_number;
   std::string text = fmt::format(
-      "# Pose of the camera in the flange: p_flange = R p_camera + t. Metres; quaternion x y z w.\n"
+      "# Pose of the camera in the flange: p_flange = R p_camera + t. Metres; quaternion x y z w. A later job takes "
+      "it\n"
+      "# up again: firstlook run --only map --calibration hand_eye.yaml\n"
       "format: {}\n"
       "verdict: {}\n"
       "# It holds for this arm (checksum of its kinematics) and these cameras only.\n"
@@ -326,16 +351,8 @@ std::string hand_eye_yaml(const StoredCalibration& c) {
       "arm_sigma_mm: {}\n"
       "arm_sigma_mrad: {}\n",
       list(Eigen::Vector3d(sigmas.head<3>())), list(Eigen::Vector3d(sigmas.tail<3>())), covariance_text(c.covariance),
-      c.corner_sigma_px, c.arm_sigma.translation_m * 1e3, c.arm_sigma.rotation_rad * 1e3);
-  text += fmt::format(
-      "intrinsics: {{image_width: {}, image_height: {}, fx_px: {}, fy_px: {}, cx_px: {}, cy_px: {},\n"
-      "             k1: {}, k2: {}, p1: {}, p2: {}, k3: {}}}\n"
-      "camera_T_depth:\n"
-      "  translation_m: {}\n"
-      "  quaternion_xyzw: {}\n",
-      k.width, k.height, k.fx, k.fy, k.cx, k.cy, k.k1, k.k2, k.p1, k.p2, k.k3, list(c.camera_T_depth.translation()),
-      list(quaternion_xyzw(c.camera_T_depth.quaternion())));
-  const std::string holdout = c.holdout_rms_px > 0 ? fmt::format("{}", c.holdout_rms_px) : "null";
+      n(c.corner_sigma_px), n(c.arm_sigma.translation_m * 1e3), n(c.arm_sigma.rotation_rad * 1e3));
+  text += intrinsics_text(c.intrinsics) + depth_text(c.camera_T_depth);
   return text + fmt::format(
                     "solver: {}\n"
                     "views: {}\n"
@@ -343,7 +360,8 @@ std::string hand_eye_yaml(const StoredCalibration& c) {
                     "reprojection_rms_px: {}\n"
                     "holdout_rms_px: {}\n"
                     "usable_distance_m: {}\n",
-                    c.solver, c.views, c.views_given, c.reprojection_rms_px, holdout, c.usable_distance_m);
+                    c.solver, c.views, c.views_given, n(c.reprojection_rms_px),
+                    c.holdout_rms_px > 0 ? n(c.holdout_rms_px) : "null", n(c.usable_distance_m));
 }
 
 Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file) {
@@ -351,7 +369,7 @@ Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file) {
   const Result<std::string> text = read_text_file(name, kFileBytesMax);
   if (!text) return std::unexpected(text.error());
   try {
-    const StoredCalibration calibration = parse(YAML::Load(*text));
+    StoredCalibration calibration = parse(YAML::Load(*text));
     if (!calibration.accepted) {
       return failure(Fault::kStoredCalibration, "{}: rejected by the run that made it", name);
     }
@@ -367,6 +385,11 @@ Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file) {
 Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, const CameraIntrinsics& intrinsics,
                      const Transform<Camera, Depth>& camera_T_depth) {
   constexpr double kSame_px = 0.01, kSameDistortion = 1e-6, kSame_m = 1e-4, kSame_rad = 1e-4;
+  if (calibration.arm_model == kUnknownArm) {
+    return failure(Fault::kStoredCalibration,
+                   "it does not say which arm it was made with: solve it again with `firstlook calibrate --arm {}`",
+                   arm.name);
+  }
   if (calibration.arm_model != arm.name) {
     return failure(Fault::kStoredCalibration, "it was made with the arm {:.20}, this one is {}", calibration.arm_model,
                    arm.name);
@@ -376,6 +399,11 @@ Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, 
                    arm.name, hash_text(calibration.kinematics), hash_text(kinematics_checksum(arm)));
   }
   const CameraIntrinsics& a = calibration.intrinsics;
+  if (a.width == 0) {
+    return failure(Fault::kStoredCalibration,
+                   "it was solved from pose pairs and does not say what camera it holds for: solve it from images or "
+                   "corners");
+  }
   const CameraIntrinsics& b = intrinsics;
   if (a.width != b.width || a.height != b.height) {
     return failure(Fault::kStoredCalibration, "it was made with pictures of {}x{}, the camera gives {}x{}", a.width,
@@ -391,7 +419,8 @@ Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, 
                    "{:.3g} px, distortion by {:.3g}",
                    px, distortion);
   }
-  const Vector6d depth = pose_difference(camera_T_depth.pose(), calibration.camera_T_depth.pose());
+  if (!calibration.camera_T_depth) return {};  // solved without one: nothing in it depends on where that sits
+  const Vector6d depth = pose_difference(camera_T_depth.pose(), calibration.camera_T_depth->pose());
   if (!(depth.head<3>().norm() <= kSame_m) || !(depth.tail<3>().norm() <= kSame_rad)) {
     return failure(Fault::kStoredCalibration, "the depth camera sits {:.2f} mm and {:.2f} mrad elsewhere than then",
                    depth.head<3>().norm() * 1e3, depth.tail<3>().norm() * 1e3);

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "algorithms/calibration/calibration_view.hpp"
 #include "algorithms/calibration/hand_eye_refinement.hpp"
@@ -14,17 +16,20 @@
 
 namespace firstlook {
 
+/// The arm of a calibration from recorded data that nobody named; no job takes that one up.
+inline constexpr std::string_view kUnknownArm = "unknown";
+
 /// Everything that hand_eye.yaml says: the transform, how sure it is, and what it holds for.
 struct StoredCalibration {
   bool accepted = false;
-  std::string arm_model;
+  std::string arm_model = std::string(kUnknownArm);
   std::uint64_t kinematics = 0;  ///< kinematics_checksum of the arm that it was made with
   Transform<Flange, Camera> flange_T_camera;
   Matrix6d covariance = Matrix6d::Zero();  ///< see pose_difference
   double corner_sigma_px = 0;              ///< as estimated from its views
   ArmSigma arm_sigma;
-  CameraIntrinsics intrinsics;              ///< of the colour camera
-  Transform<Camera, Depth> camera_T_depth;  ///< as used with it
+  CameraIntrinsics intrinsics;  ///< of the colour camera; width 0: solved from pose pairs, none known
+  std::optional<Transform<Camera, Depth>> camera_T_depth;  ///< as used with it; empty: no depth camera took part
   std::string solver;
   int views = 0;        ///< used in the solve
   int views_given = 0;  ///< with those left out as wrong

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "algorithms/mapping/moveit_scene.hpp"
+#include "app/report/yaml_number.hpp"
 
 namespace firstlook {
 namespace {
@@ -13,7 +13,8 @@ namespace {
 /// -0 prints as "-0"; adding 0 makes it plain.
 double plain(double v) { return v + 0.0; }
 
-/// Translation and quaternion in the order x y z qx qy qz qw, ten digits: far below what any calibration resolves.
+/// Translation and quaternion in the order x y z qx qy qz qw. Twelve decimals keep a transform to 1e-12 m and a few
+/// 1e-12 rad, and fixed-point text is what std::stod, atof, YAML and XML readers all take.
 struct Numbers {
   double x, y, z, qx, qy, qz, qw;
 };
@@ -40,35 +41,57 @@ std::string easy_handeye_parameters(std::string_view head) {
       head, kFlangeFrame, kCameraFrame);
 }
 
-/// easy_handeye finds a calibration by the last part of its namespace, and `eye_on_hand` adds the ending.
+/// easy_handeye finds a calibration by the last part of its namespace, and `eye_on_hand` adds the ending. The namespace
+/// ends with a slash because easy_handeye puts names of parameters directly behind it.
 std::string easy_handeye_yaml(const Numbers& n) {
-  return easy_handeye_parameters("  eye_on_hand: true\n  namespace: /firstlook_eye_on_hand/\n") +
+  return fmt::format(
+             "# Hand-eye calibration for easy_handeye (ROS 1), written by firstlook: the pose of {} in {},\n"
+             "# metres and quaternion. To publish it:\n"
+             "#   mkdir -p ~/.ros/easy_handeye && cp easy_handeye.yaml ~/.ros/easy_handeye/firstlook_eye_on_hand.yaml\n"
+             "#   roslaunch easy_handeye publish.launch eye_on_hand:=true namespace_prefix:=firstlook\n",
+             kCameraFrame, kFlangeFrame) +
+         easy_handeye_parameters("  eye_on_hand: true\n  namespace: /firstlook_eye_on_hand/\n") +
          fmt::format(
              "transformation:\n"
-             "  x: {:.10f}\n  y: {:.10f}\n  z: {:.10f}\n  qx: {:.10f}\n  qy: {:.10f}\n  qz: {:.10f}\n  qw: {:.10f}\n",
+             "  x: {:.12f}\n  y: {:.12f}\n  z: {:.12f}\n  qx: {:.12f}\n  qy: {:.12f}\n  qz: {:.12f}\n  qw: {:.12f}\n",
              n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw);
 }
 
 std::string easy_handeye2_calib(const Numbers& n) {
-  return easy_handeye_parameters("  name: firstlook\n  calibration_type: eye_in_hand\n") +
+  return fmt::format(
+             "# Hand-eye calibration for easy_handeye2 (ROS 2), written by firstlook: the pose of {} in\n"
+             "# {}, metres and quaternion. To publish it:\n"
+             "#   mkdir -p ~/.ros2/easy_handeye2/calibrations\n"
+             "#   cp easy_handeye2.calib ~/.ros2/easy_handeye2/calibrations/firstlook.calib\n"
+             "#   ros2 launch easy_handeye2 publish.launch.py name:=firstlook\n",
+             kCameraFrame, kFlangeFrame) +
+         easy_handeye_parameters("  name: firstlook\n  calibration_type: eye_in_hand\n") +
          fmt::format(
              "transform:\n"
-             "  translation:\n    x: {:.10f}\n    y: {:.10f}\n    z: {:.10f}\n"
-             "  rotation:\n    x: {:.10f}\n    y: {:.10f}\n    z: {:.10f}\n    w: {:.10f}\n",
+             "  translation:\n    x: {:.12f}\n    y: {:.12f}\n    z: {:.12f}\n"
+             "  rotation:\n    x: {:.12f}\n    y: {:.12f}\n    z: {:.12f}\n    w: {:.12f}\n",
              n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw);
 }
 
 std::string ros1_launch(const Numbers& n) {
   return fmt::format(
+      "<!-- Hand-eye calibration, written by firstlook: publishes the pose of {} in {} (metres and\n"
+      "     quaternion, in the order x y z qx qy qz qw parent child) in ROS 1. To start it:\n"
+      "       roslaunch ./camera_transform.launch\n"
+      "     A frame has one parent: when the camera's driver publishes this one itself, use camera.xacro. -->\n"
       "<launch>\n"
       "  <node pkg=\"tf2_ros\" type=\"static_transform_publisher\" name=\"firstlook_camera\"\n"
-      "        args=\"{:.10f} {:.10f} {:.10f} {:.10f} {:.10f} {:.10f} {:.10f} {} {}\"/>\n"
+      "        args=\"{:.12f} {:.12f} {:.12f} {:.12f} {:.12f} {:.12f} {:.12f} {} {}\"/>\n"
       "</launch>\n",
-      n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw, kFlangeFrame, kCameraFrame);
+      kCameraFrame, kFlangeFrame, n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw, kFlangeFrame, kCameraFrame);
 }
 
 std::string ros2_launch(const Numbers& n) {
   return fmt::format(
+      "# Hand-eye calibration, written by firstlook: publishes the pose of {} in {} (metres and\n"
+      "# quaternion) in ROS 2 (Humble and later; before, the publisher knew no names of arguments). To start it:\n"
+      "#   ros2 launch ./camera_transform.launch.py\n"
+      "# A frame has one parent: when the camera's driver publishes this one itself, use camera.xacro.\n"
       "from launch import LaunchDescription\n"
       "from launch_ros.actions import Node\n\n\n"
       "def generate_launch_description():\n"
@@ -78,46 +101,52 @@ std::string ros2_launch(const Numbers& n) {
       "            executable='static_transform_publisher',\n"
       "            name='firstlook_camera',\n"
       "            arguments=[\n"
-      "                '--x', '{:.10f}', '--y', '{:.10f}', '--z', '{:.10f}',\n"
-      "                '--qx', '{:.10f}', '--qy', '{:.10f}', '--qz', '{:.10f}', '--qw', '{:.10f}',\n"
+      "                '--x', '{:.12f}', '--y', '{:.12f}', '--z', '{:.12f}',\n"
+      "                '--qx', '{:.12f}', '--qy', '{:.12f}', '--qz', '{:.12f}', '--qw', '{:.12f}',\n"
       "                '--frame-id', '{}', '--child-frame-id', '{}',\n"
       "            ],\n"
       "        ),\n"
       "    ])\n",
-      n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw, kFlangeFrame, kCameraFrame);
+      kCameraFrame, kFlangeFrame, n.x, n.y, n.z, n.qx, n.qy, n.qz, n.qw, kFlangeFrame, kCameraFrame);
 }
+
+constexpr std::string_view kXacroHead =
+    "<?xml version=\"1.0\"?>\n"
+    "<!-- Hand-eye calibration as a part of a robot description, written by firstlook: the pose of\n"
+    "     camera_color_optical_frame (z forward, x right, y down) in the parent, by way of camera_link (x forward,\n"
+    "     y left, z up: REP 103). In the robot's xacro:\n"
+    "       <xacro:include filename=\"/path/to/camera.xacro\"/>\n"
+    "       <xacro:firstlook_camera parent=\"tool0\"/>\n"
+    "     A frame has one parent: tell the camera's driver not to publish these two itself (publish_tf:=false), or\n"
+    "     rename them here when its own tree is to stay. -->\n";
 
 /// tool0 -> camera_link -> camera_color_optical_frame: the second joint is the fixed turn of REP 103, so the first one
 /// is chosen such that the whole is the calibrated transform.
 std::string xacro(const Transform<Flange, Camera>& flange_T_camera) {
-  constexpr double kQuarter = std::numbers::pi / 2;
-  Pose link_T_optical = Pose::Identity();
-  link_T_optical.linear() =
-      (Eigen::AngleAxisd(-kQuarter, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-kQuarter, Eigen::Vector3d::UnitX()))
-          .toRotationMatrix();
-  const Pose flange_T_link = flange_T_camera.pose() * link_T_optical.inverse(Eigen::Isometry);
-  const Eigen::Vector3d t = flange_T_link.translation();
-  const Eigen::Vector3d rpy = roll_pitch_yaw(flange_T_link.linear());
-  return fmt::format(
-      "<?xml version=\"1.0\"?>\n"
-      "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n"
-      "  <xacro:macro name=\"firstlook_camera\" params=\"parent:={}\">\n"
-      "    <link name=\"{}\"/>\n"
-      "    <joint name=\"firstlook_camera_joint\" type=\"fixed\">\n"
-      "      <parent link=\"${{parent}}\"/>\n"
-      "      <child link=\"{}\"/>\n"
-      "      <origin xyz=\"{:.10f} {:.10f} {:.10f}\" rpy=\"{:.10f} {:.10f} {:.10f}\"/>\n"
-      "    </joint>\n"
-      "    <link name=\"{}\"/>\n"
-      "    <joint name=\"firstlook_camera_optical_joint\" type=\"fixed\">\n"
-      "      <parent link=\"{}\"/>\n"
-      "      <child link=\"{}\"/>\n"
-      "      <origin xyz=\"0 0 0\" rpy=\"${{-pi/2}} 0 ${{-pi/2}}\"/>\n"
-      "    </joint>\n"
-      "  </xacro:macro>\n"
-      "</robot>\n",
-      kFlangeFrame, kCameraLinkFrame, kCameraLinkFrame, plain(t.x()), plain(t.y()), plain(t.z()), plain(rpy.x()),
-      plain(rpy.y()), plain(rpy.z()), kCameraFrame, kCameraLinkFrame, kCameraFrame);
+  Eigen::Matrix3d link_R_optical;  // rpy -pi/2 0 -pi/2, without the rounding of sines and cosines
+  link_R_optical << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Eigen::Vector3d t = flange_T_camera.translation();
+  const Eigen::Vector3d rpy = roll_pitch_yaw(flange_T_camera.rotation() * link_R_optical.transpose());
+  return std::string(kXacroHead) +
+         fmt::format(
+             "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n"
+             "  <xacro:macro name=\"firstlook_camera\" params=\"parent:={}\">\n"
+             "    <link name=\"{}\"/>\n"
+             "    <joint name=\"firstlook_camera_joint\" type=\"fixed\">\n"
+             "      <parent link=\"${{parent}}\"/>\n"
+             "      <child link=\"{}\"/>\n"
+             "      <origin xyz=\"{:.12f} {:.12f} {:.12f}\" rpy=\"{:.12f} {:.12f} {:.12f}\"/>\n"
+             "    </joint>\n"
+             "    <link name=\"{}\"/>\n"
+             "    <joint name=\"firstlook_camera_optical_joint\" type=\"fixed\">\n"
+             "      <parent link=\"{}\"/>\n"
+             "      <child link=\"{}\"/>\n"
+             "      <origin xyz=\"0 0 0\" rpy=\"${{-pi/2}} 0 ${{-pi/2}}\"/>\n"
+             "    </joint>\n"
+             "  </xacro:macro>\n"
+             "</robot>\n",
+             kFlangeFrame, kCameraLinkFrame, kCameraLinkFrame, plain(t.x()), plain(t.y()), plain(t.z()), plain(rpy.x()),
+             plain(rpy.y()), plain(rpy.z()), kCameraFrame, kCameraLinkFrame, kCameraFrame);
 }
 
 std::string scene_text(std::span<const AxisBox> boxes, std::string_view name) {
@@ -147,8 +176,17 @@ std::vector<NamedFile> ros_scene_files(std::span<const AxisBox> occupied) {
     turned.push_back(
         {{-box.high_m.x(), -box.high_m.y(), box.low_m.z()}, {-box.low_m.x(), -box.low_m.y(), box.high_m.z()}});
   }
-  return {{"collision_map_base_link.scene", scene_text(turned, "firstlook collision map in base_link")},
-          {"collision_map_base.scene", scene_text(occupied, "firstlook collision map in base")}};
+  return {
+      {"collision_map_base_link.scene",
+       scene_text(
+           turned,
+           "firstlook collision map in base_link, the planning frame of a UR: RViz, MotionPlanning, Scene Objects, "
+           "Import")},
+      {"collision_map_base.scene",
+       scene_text(
+           occupied,
+           "firstlook collision map in base, UR's frame: only where MoveIt plans in base; RViz, MotionPlanning, Scene "
+           "Objects, Import")}};
 }
 
 std::string ros2_static_transform_command(const Transform<Flange, Camera>& flange_T_camera) {
@@ -170,7 +208,12 @@ std::string ur_pose_text(const Transform<Flange, Camera>& flange_T_camera) {
 }
 
 std::string camera_info_yaml(const CameraIntrinsics& c) {
+  const auto n = yaml_number;
   return fmt::format(
+      "# Intrinsics of the colour camera as ROS has them, written by firstlook. To load them, give the camera's "
+      "driver\n"
+      "#   camera_info_url:=file:///path/to/camera_info.yaml\n"
+      "# camera_info_manager warns when its camera has another name, and takes the numbers all the same.\n"
       "image_width: {}\n"
       "image_height: {}\n"
       "camera_name: camera\n"
@@ -180,14 +223,19 @@ std::string camera_info_yaml(const CameraIntrinsics& c) {
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n"
       "projection_matrix:\n  rows: 3\n  cols: 4\n"
       "  data: [{}, 0.0, {}, 0.0, 0.0, {}, {}, 0.0, 0.0, 0.0, 1.0, 0.0]\n",
-      c.width, c.height, c.fx, c.cx, c.fy, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.fx, c.cx, c.fy, c.cy);
+      c.width, c.height, n(c.fx), n(c.cx), n(c.fy), n(c.cy), n(c.k1), n(c.k2), n(c.p1), n(c.p2), n(c.k3), n(c.fx),
+      n(c.cx), n(c.fy), n(c.cy));
 }
 
 Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& r) {
+  // A camera that looks along the tool has its camera_link at a pitch of 90 degrees, where yaw and roll are known only
+  // together: roll is taken from what is left after the yaw found, so that together they are right in any case.
   const double horizontal = std::hypot(r(0, 0), r(1, 0));
   const double pitch = std::atan2(-r(2, 0), horizontal);
-  if (horizontal < 1e-9) return {std::atan2(-r(1, 2), r(1, 1)), pitch, 0.0};
-  return {std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))};
+  const double yaw = horizontal < 1e-12 ? 0.0 : std::atan2(r(1, 0), r(0, 0));
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  const double roll = std::atan2(s * r(0, 2) - c * r(1, 2), c * r(1, 1) - s * r(0, 1));
+  return {roll, pitch, yaw};
 }
 
 }  // namespace firstlook

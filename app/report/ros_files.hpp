@@ -23,8 +23,9 @@ struct NamedFile {
   std::string text;
 };
 
-/// easy_handeye (ROS 1) and easy_handeye2 calibrations, static transforms as launch files for ROS 1 and ROS 2, and a
-/// xacro, all of the same transform.
+/// easy_handeye (ROS 1) and easy_handeye2 calibrations, static transforms as launch files for ROS 1 and ROS 2 (the
+/// order and the names of tf2_ros static_transform_publisher's arguments), and a xacro with REP 103's camera_link, all
+/// of the same transform to 1e-11; each says at its top what it is and how to load it.
 [[nodiscard]] std::vector<NamedFile> ros_calibration_files(const Transform<Flange, Camera>& flange_T_camera);
 
 /// MoveIt planning scenes of occupied boxes given in the controller's base: one in `base_link` (what MoveIt plans in on

@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
+#include "app/report/calibration_files.hpp"
 #include "app/report/report_html.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/ros_files.hpp"
@@ -12,39 +11,23 @@
 namespace firstlook {
 namespace {
 
-/// What hand_eye.yaml says of this run's calibration; of a stored one the same again, with the verdict of its test.
+/// This run's calibration; of a stored one the same again, with the verdict of its test.
 StoredCalibration stored_form(const RunRecord& record) {
-  if (record.verified) return record.verified->calibration;
-  const HandEyeResult& h = *record.hand_eye;
-  StoredCalibration c;
-  c.accepted = h.verdict == Verdict::kAccepted;
-  c.arm_model = record.provenance.arm_model;
-  if (const auto arm = find_arm_model(c.arm_model)) c.kinematics = kinematics_checksum(*arm);
-  c.flange_T_camera = h.flange_T_camera;
-  c.covariance = h.covariance;
-  c.corner_sigma_px = h.corner_sigma_px;
-  c.arm_sigma = h.arm_sigma;
+  if (record.verified) {
+    StoredCalibration c = record.verified->calibration;
+    c.accepted = c.accepted && record.hand_eye->verdict == Verdict::kAccepted;
+    return c;
+  }
+  StoredCalibration c = stored_calibration(*record.hand_eye, record.solver, record.provenance.arm_model);
   c.intrinsics = record.intrinsics;
   c.camera_T_depth = record.camera_T_depth;
-  c.solver = record.solver;
-  c.views = h.views;
-  c.views_given = static_cast<int>(h.fits.size());
-  c.reprojection_rms_px = h.reprojection_rms_px;
-  c.holdout_rms_px = h.holdout_rms_m > 0 ? h.holdout_rms_px : 0;
-  c.usable_distance_m = h.usable_distance_m;
   return c;
 }
 
-/// A rejected calibration stays readable in hand_eye.yaml, but nothing that a robot would load is made of it.
-std::vector<NamedFile> files_of_calibration(const RunRecord& record) {
+std::vector<NamedFile> files_of_run(const RunRecord& record) {
   std::vector<NamedFile> files;
+  if (record.hand_eye) files = calibration_files(stored_form(record));
   if (record.intrinsics.width > 0) files.push_back({"camera_info.yaml", camera_info_yaml(record.intrinsics)});
-  if (!record.hand_eye) return files;
-  files.push_back({"hand_eye.yaml", hand_eye_yaml(stored_form(record))});
-  if (record.hand_eye->verdict != Verdict::kAccepted) return files;
-  for (NamedFile& file : ros_calibration_files(record.hand_eye->flange_T_camera)) {
-    files.push_back({"ros/" + file.name, std::move(file.text)});
-  }
   return files;
 }
 
@@ -56,18 +39,6 @@ std::vector<NamedFile> files_of_map(const MapFiles& map) {
   if (map.occupied.empty()) return files;
   for (NamedFile& file : ros_scene_files(map.occupied)) files.push_back({"ros/" + file.name, std::move(file.text)});
   return files;
-}
-
-Status write_files(const std::string& folder, const std::vector<NamedFile>& files) {
-  const bool ros =
-      std::any_of(files.begin(), files.end(), [](const NamedFile& f) { return f.name.starts_with("ros/"); });
-  if (ros) {
-    if (Status status = make_directories(folder + "/ros"); !status) return status;
-  }
-  for (const NamedFile& file : files) {
-    if (Status status = write_file_atomically(folder + "/" + file.name, file.text); !status) return status;
-  }
-  return {};
 }
 
 }  // namespace
@@ -97,12 +68,12 @@ std::string views_csv(const RunRecord& record) {
 
 Status write_run_files(const std::string& folder, const RunRecord& record, const MapFiles& map) {
   if (Status status = make_directories(folder); !status) return status;
-  std::vector<NamedFile> files = files_of_calibration(record);
+  std::vector<NamedFile> files = files_of_run(record);
   for (NamedFile& file : files_of_map(map)) files.push_back(std::move(file));
   files.push_back({"views.csv", views_csv(record)});
   files.push_back({"report.html", report_html(record)});
   files.push_back({"result.json", result_json(record)});
-  return write_files(folder, files);
+  return write_named_files(folder, files);
 }
 
 }  // namespace firstlook

@@ -317,12 +317,12 @@ MapFiles Cart::map_files() const {
     };
   };
   auto bt = into(files.collision_map_bt);
-  write_bt(bench_->map(), kOctreeDepth, bt);
+  write_bt(bench_->map(), collision_class, kOctreeDepth, bt);
   auto ot = into(files.map_ot);
   write_ot(bench_->map(), kOctreeDepth, ot);
   auto ply = into(files.map_ply);
   write_ply(bench_->map(), false, ply);
-  files.occupied = merge_occupied(bench_->map());
+  files.occupied = merge_occupied(bench_->map(), collision_class);
   return files;
 }
 

@@ -36,7 +36,7 @@ VoxelMap map_of(const DepthFrames& frames, double resolution_m) {
 /// The same voxels as an octree, by way of the file format.
 octomap::OcTree octree_of(const VoxelMap& map) {
   std::stringstream file;
-  write_bt(map, kOctreeDepth, [&](std::span<const std::byte> bytes) {
+  write_bt(map, octomap_class, kOctreeDepth, [&](std::span<const std::byte> bytes) {
     file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   });
   octomap::OcTree tree(map.geometry().resolution_m);

@@ -10,10 +10,12 @@
 
 // jpeglib.h needs <cstdio> before it.
 #include <jpeglib.h>
+#include <yaml-cpp/yaml.h>
 
 #include "algorithms/calibration/verdict.hpp"
 #include "app/cli/calibrate_command.hpp"
 #include "app/dataset/gray_image_file.hpp"
+#include "app/dataset/hand_eye_file.hpp"
 #include "tests/unit/calibration/synthetic_views.hpp"
 #include "tests/unit/vision/draw_board.hpp"
 
@@ -320,6 +322,68 @@ TEST_CASE("images: a board that looks the same upside down, a board not seen, a 
   check_refused(folder, Fault::kBoardNotFound, "in none of 1 images");
   folder.write("poses.csv", kPosesHeader + "gone.png,0.1,0.2,0.3,0,0,0,1\n");
   check_refused(folder, Fault::kDataMissing, "gone.png");
+}
+
+TEST_CASE("calibrate --out leaves what a run leaves of its calibration", "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("out");
+  write_corners(folder, setup, 15);
+  CalibrateCommandOptions options;
+  options.dataset = folder.path.string();
+  options.strict = options.json = true;
+  options.out = (folder.path / "result").string();
+  options.arm = "ur5e";
+  REQUIRE(run_calibrate_command(options) == 0);
+  CHECK(run_calibrate_command(options) == 3);  // a folder that is not empty stays as it is
+  const fs::path out = options.out;
+  const auto stored = read_hand_eye(out / "hand_eye.yaml");
+  if (!stored) FAIL(stored.error().detail());
+  CHECK(check_belongs(*stored, *find_arm_model("ur5e"), setup.camera, {}));
+  CHECK(stored->views == 15);
+  CHECK(*read_camera_info(out / "camera_info.yaml") == setup.camera);
+  const Pose pose = stored->flange_T_camera.pose();
+  const YAML::Node easy = YAML::LoadFile((out / "ros/easy_handeye.yaml").string())["transformation"];
+  CHECK(easy["x"].as<double>() == Approx(pose.translation().x()).margin(1e-11));
+  for (const char* name :
+       {"easy_handeye2.calib", "camera_transform.launch", "camera_transform.launch.py", "camera.xacro"}) {
+    CHECK(fs::file_size(out / "ros" / name) > 200);
+  }
+  CHECK(std::distance(fs::recursive_directory_iterator(out), fs::recursive_directory_iterator()) == 8);
+}
+
+TEST_CASE("calibrate --out: pose pairs know no camera, and nothing for ROS is made of a rejected one",
+          "[app][calibration]") {
+  const Setup setup;
+  const Folder folder("out_pairs");
+  Random random(62);
+  std::string rows = kPairsHeader;
+  for (int i = 0; i < 20; ++i) {
+    const Pose camera_T_board = test::random_camera_T_board(setup, random);
+    rows += numbers(test::flange_for(setup, camera_T_board)) + "," + numbers(camera_T_board) + "\n";
+  }
+  folder.write("pairs.csv", rows);
+  CalibrateCommandOptions options;
+  options.dataset = folder.path.string();
+  options.out = (folder.path / "pairs").string();
+  REQUIRE(run_calibrate_command(options) == 0);
+  CHECK_FALSE(fs::exists(folder.path / "pairs/camera_info.yaml"));
+  const auto stored = read_hand_eye(folder.path / "pairs/hand_eye.yaml");
+  if (!stored) FAIL(stored.error().detail());
+  CHECK(stored->intrinsics.width == 0);
+  CHECK(stored->arm_model == kUnknownArm);
+  CHECK((stored->flange_T_camera.translation() - setup.flange_T_camera.translation()).norm() < 1e-3);
+
+  const Folder few("out_rejected");
+  write_corners(few, setup, 4);  // solved, too few views to be trusted
+  options.dataset = few.path.string();
+  options.out = (few.path / "rejected").string();
+  REQUIRE(run_calibrate_command(options) == 0);
+  CHECK(read_hand_eye(few.path / "rejected/hand_eye.yaml").error().fault == Fault::kStoredCalibration);
+  CHECK_FALSE(fs::exists(few.path / "rejected/ros"));
+  options.out = (few.path / "board.yaml").string();
+  CHECK(run_calibrate_command(options) == 3);  // a file, not a folder
+  options.arm = "puma";
+  CHECK(run_calibrate_command(options) == 2);
 }
 
 TEST_CASE("exit codes of the command", "[app][calibration]") {

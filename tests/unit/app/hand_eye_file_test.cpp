@@ -97,7 +97,7 @@ TEST_CASE("a written calibration reads back whole", "[hand_eye_file]") {
   CHECK(read->arm_sigma.translation_m == Approx(c.arm_sigma.translation_m));
   CHECK(read->arm_sigma.rotation_rad == Approx(c.arm_sigma.rotation_rad));
   CHECK(read->intrinsics == c.intrinsics);
-  CHECK(pose_difference(read->camera_T_depth.pose(), c.camera_T_depth.pose()).norm() < 1e-15);
+  CHECK(pose_difference(read->camera_T_depth.value().pose(), c.camera_T_depth.value().pose()).norm() < 1e-15);
   CHECK(read->solver == c.solver);
   CHECK(read->views == 15);
   CHECK(read->views_given == 16);
@@ -135,7 +135,7 @@ TEST_CASE("keys: all of them, once, and no others", "[hand_eye_file]") {
   CHECK_THAT(refused(whole + "views: 3\n"), Contains("views is given twice"));
   CHECK_THAT(refused(with_line("  translation_m", "  translation: [0, 0, 0]")),
              Contains("'translation'; did you mean translation_m?"));
-  CHECK_THAT(refused(with_line("format", "format: 2")), Contains(":2: format 2 is not known"));
+  CHECK_THAT(refused(with_line("format", "format: 2")), Contains(":3: format 2 is not known"));
 }
 
 TEST_CASE("values that cannot be", "[hand_eye_file]") {
@@ -145,13 +145,18 @@ TEST_CASE("values that cannot be", "[hand_eye_file]") {
   };
   check("verdict", "verdict: splendid", "accepted or rejected");
   check("parent_frame", "parent_frame: wrist_2_link", "'wrist_2_link'; only tool0");
+  check("parent_frame", "parent_frame: camera_color_optical_frame", "only tool0");
   check("child_frame", "child_frame: camera_link", "only camera_color_optical_frame");
   check("translation_m", "translation_m: [1, -70, 60]", "looks like millimetres");
   check("translation_m", "translation_m: [.nan, 0, 0]", "finite number, not '.nan'");
   check("translation_m", "translation_m: [0, 0]", "list of 3 numbers");
   check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 0, 0.99]", "norm 0.99");
-  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 0, 5]", "is 5; must be between");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 0, 5]", "norm 5 instead of 1");
   check("quaternion_xyzw", "quaternion_xyzw: [0, 0, .inf, 1]", "finite");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, .nan, 1]", "finite");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 0, 0]", "norm 0 instead of 1");
+  check("quaternion_xyzw", "quaternion_xyzw: [0, 0, 1]", "list of 4 numbers");
+
   check("kinematics", "kinematics: 12xy", "16 hexadecimal digits");
   check("corner_sigma_px", "corner_sigma_px: -1", "between 0 and 100");
   check("solver", "solver: guess", "'guess' is not known");
@@ -161,6 +166,59 @@ TEST_CASE("values that cannot be", "[hand_eye_file]") {
   check("arm_model", "arm_model: []", "must be a word");
   check("intrinsics", "intrinsics: {image_width: 640, image_height: 480, fx_px: 0, fy_px: 538, cx_px: 320, cy_px: 240,",
         "intrinsics.fx_px is 0");
+}
+
+TEST_CASE("the pose of the flange in the camera is not taken for the pose of the camera in the flange",
+          "[hand_eye_file]") {
+  std::string text = hand_eye_yaml(sample());
+  const auto swap_in = [&](const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    REQUIRE(at != std::string::npos);
+    text.replace(at, from.size(), to);
+  };
+  swap_in("parent_frame: tool0", "parent_frame: camera_color_optical_frame");
+  swap_in("child_frame: camera_color_optical_frame", "child_frame: tool0");
+  CHECK_THAT(refused(text), Contains(fmt::format(":{}:", line_of(text, "parent_frame"))) &&
+                                Contains("parent_frame and child_frame are swapped") && Contains("not its inverse"));
+}
+
+TEST_CASE("each key that is missing is named", "[hand_eye_file]") {
+  const std::string whole = hand_eye_yaml(sample());
+  for (const char* key : {"format", "verdict", "arm_model", "kinematics", "parent_frame", "child_frame",
+                          "translation_m", "quaternion_xyzw", "sigma_translation_mm", "sigma_rotation_mrad",
+                          "corner_sigma_px", "solver", "views", "reprojection_rms_px", "usable_distance_m"}) {
+    const std::size_t at = whole.find(fmt::format("\n{}:", key)) + 1;
+    std::string text = whole;
+    text.erase(at, text.find('\n', at) + 1 - at);
+    CHECK_THAT(refused(text), Contains(fmt::format("no key {}:", key)));
+  }
+}
+
+TEST_CASE("a calibration of recorded data says what it cannot know, and no job takes it for more", "[hand_eye_file]") {
+  StoredCalibration c = sample();
+  c.camera_T_depth.reset();
+  const ArmModel arm = *find_arm_model("ur5");
+  const auto again = [](const StoredCalibration& calibration) {
+    const File file(hand_eye_yaml(calibration));
+    const auto read = read_hand_eye(file.path());
+    if (!read) FAIL(read.error().detail());
+    return *read;
+  };
+  CHECK_FALSE(again(c).camera_T_depth);
+  // Nothing in it depends on the depth camera: that may be anywhere.
+  CHECK(check_belongs(again(c), arm, c.intrinsics, Transform<Camera, Depth>({1, 0, 0, 0}, {0.1, 0, 0})));
+  const auto why = [&](const StoredCalibration& calibration) {
+    const Status status = check_belongs(again(calibration), arm, c.intrinsics, {});
+    REQUIRE_FALSE(status);
+    CHECK(status.error().fault == Fault::kStoredCalibration);
+    return std::string(status.error().detail());
+  };
+  StoredCalibration pairs = c, nobody = c;
+  pairs.intrinsics = {};
+  CHECK_THAT(why(pairs), Contains("solved from pose pairs"));
+  nobody.arm_model = kUnknownArm;
+  nobody.kinematics = 0;
+  CHECK_THAT(why(nobody), Contains("which arm") && Contains("--arm ur5"));
 }
 
 TEST_CASE("a covariance must be one, in metres and radians", "[hand_eye_file]") {
@@ -185,26 +243,26 @@ TEST_CASE("a covariance must be one, in metres and radians", "[hand_eye_file]") 
 TEST_CASE("a calibration belongs to its arm and its cameras", "[hand_eye_file]") {
   const StoredCalibration c = sample();
   const ArmModel arm = *find_arm_model("ur5");
-  CHECK(check_belongs(c, arm, c.intrinsics, c.camera_T_depth));
+  CHECK(check_belongs(c, arm, c.intrinsics, *c.camera_T_depth));
   const auto why = [&](const ArmModel& a, const CameraIntrinsics& k, const Transform<Camera, Depth>& depth) {
     const Status status = check_belongs(c, a, k, depth);
     REQUIRE_FALSE(status);
     CHECK(status.error().fault == Fault::kStoredCalibration);
     return std::string(status.error().detail());
   };
-  CHECK_THAT(why(*find_arm_model("ur10e"), c.intrinsics, c.camera_T_depth), Contains("ur5, this one is ur10e"));
+  CHECK_THAT(why(*find_arm_model("ur10e"), c.intrinsics, *c.camera_T_depth), Contains("ur5, this one is ur10e"));
   ArmModel corrected = arm;
   corrected.dh[1].a_m += 1e-4;
-  CHECK_THAT(why(corrected, c.intrinsics, c.camera_T_depth), Contains("other kinematics of the ur5"));
+  CHECK_THAT(why(corrected, c.intrinsics, *c.camera_T_depth), Contains("other kinematics of the ur5"));
   CameraIntrinsics larger = c.intrinsics, other = c.intrinsics;
   larger.width = 800;
-  CHECK_THAT(why(arm, larger, c.camera_T_depth), Contains("640x480, the camera gives 800x480"));
+  CHECK_THAT(why(arm, larger, *c.camera_T_depth), Contains("640x480, the camera gives 800x480"));
   other.cy += 0.5;
-  CHECK_THAT(why(arm, other, c.camera_T_depth), Contains("0.5 px"));
+  CHECK_THAT(why(arm, other, *c.camera_T_depth), Contains("0.5 px"));
   other = c.intrinsics;
   other.k2 += 0.001;
-  CHECK_THAT(why(arm, other, c.camera_T_depth), Contains("distortion by 0.001"));
-  const Transform<Camera, Depth> moved(c.camera_T_depth.quaternion(), {-0.022, 0, 0});
+  CHECK_THAT(why(arm, other, *c.camera_T_depth), Contains("distortion by 0.001"));
+  const Transform<Camera, Depth> moved(c.camera_T_depth->quaternion(), {-0.022, 0, 0});
   CHECK_THAT(why(arm, c.intrinsics, moved), Contains("3.00 mm"));
 }
 

@@ -5,18 +5,13 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <set>
-
-#include <yaml-cpp/yaml.h>
 
 #include "app/report/done_text.hpp"
 #include "app/report/html.hpp"
 #include "app/report/picture_bytes.hpp"
 #include "app/report/report_html.hpp"
 #include "app/report/result_json.hpp"
-#include "app/report/ros_files.hpp"
 #include "app/report/run_files.hpp"
-#include "platform/core/random.hpp"
 #include "tests/unit/app/sample_record.hpp"
 
 using namespace firstlook;
@@ -333,62 +328,6 @@ TEST_CASE("pictures are shrunk by whole blocks and encoded the same each time", 
   CHECK(encode_jpeg(GrayPicture{0, 3, {}}).empty());
 }
 
-TEST_CASE("all files of the calibration carry the same transform", "[report]") {
-  Random random(3, 1);
-  for (int trial = 0; trial < 50; ++trial) {
-    const Transform<Flange, Camera> truth(random.rotation(), 0.1 * random.normal3());
-    const std::vector<NamedFile> files = ros_calibration_files(truth);
-    const std::string& xacro = files.back().text;
-    double x = 0, y = 0, z = 0, roll = 0, pitch = 0, yaw = 0;
-    REQUIRE(std::sscanf(xacro.c_str() + xacro.find("<origin"), "<origin xyz=\"%lf %lf %lf\" rpy=\"%lf %lf %lf\"/>", &x,
-                        &y, &z, &roll, &pitch, &yaw) == 6);
-    const auto rotation = [](double r, double p, double w) {
-      return (Eigen::AngleAxisd(w, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(p, Eigen::Vector3d::UnitY()) *
-              Eigen::AngleAxisd(r, Eigen::Vector3d::UnitX()))
-          .toRotationMatrix();
-    };
-    Pose flange_T_link = Pose::Identity(), link_T_optical = Pose::Identity();
-    flange_T_link.linear() = rotation(roll, pitch, yaw);
-    flange_T_link.translation() = Eigen::Vector3d(x, y, z);
-    link_T_optical.linear() = rotation(-M_PI / 2, 0, -M_PI / 2);
-    CHECK((flange_T_link * link_T_optical).isApprox(truth.pose(), 1e-8));
-    // REP 103: the camera looks along x of its link.
-    CHECK((link_T_optical.linear() * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX()));
-
-    double qx = 0, qy = 0, qz = 0, qw = 0;
-    const std::string& ros1 = files[2].text;
-    REQUIRE(std::sscanf(ros1.c_str() + ros1.find("args=\""), "args=\"%lf %lf %lf %lf %lf %lf %lf tool0", &x, &y, &z,
-                        &qx, &qy, &qz, &qw) == 7);
-    CHECK(Transform<Flange, Camera>(Eigen::Quaterniond(qw, qx, qy, qz), {x, y, z}).pose().isApprox(truth.pose(), 1e-8));
-
-    REQUIRE(std::sscanf(ur_pose_text(truth).c_str(), "p[%lf, %lf, %lf, %lf, %lf, %lf]", &x, &y, &z, &roll, &pitch,
-                        &yaw) == 6);
-    const Eigen::Vector3d turn(roll, pitch, yaw);
-    const Eigen::AngleAxisd ur(turn.norm(), turn.normalized());
-    CHECK(ur.toRotationMatrix().isApprox(truth.rotation(), 1e-5));
-  }
-}
-
-TEST_CASE("easy_handeye gets only keys that it knows, and finds the file by its name", "[report]") {
-  const std::vector<NamedFile> files = ros_calibration_files({});
-  // The keywords of easy_handeye's HandeyeCalibrationParameters, which refuses others.
-  const std::set<std::string> known = {"eye_on_hand",          "namespace",           "robot_base_frame",
-                                       "robot_effector_frame", "tracking_base_frame", "tracking_marker_frame",
-                                       "move_group_namespace", "move_group"};
-  const YAML::Node first = YAML::Load(files[0].text);
-  for (const auto& item : first["parameters"]) CHECK(known.contains(item.first.as<std::string>()));
-  CHECK(first["parameters"].size() == known.size());
-  CHECK(first["parameters"]["namespace"].as<std::string>() == "/firstlook_eye_on_hand/");
-  CHECK(first["transformation"].size() == 7);
-  const YAML::Node second = YAML::Load(files[1].text);
-  CHECK(second["parameters"]["calibration_type"].as<std::string>() == "eye_in_hand");
-  CHECK(second["transform"]["rotation"]["w"].as<double>() == 1);
-  for (const YAML::Node& file : {first, second}) {
-    CHECK(file["parameters"]["robot_effector_frame"].as<std::string>() == "tool0");
-    CHECK(file["parameters"]["tracking_base_frame"].as<std::string>() == "camera_color_optical_frame");
-  }
-}
-
 TEST_CASE("figures of a validation that did not take place are absent", "[report]") {
   RunRecord record = sample_record();
   HandEyeResult& h = *record.hand_eye;
@@ -406,30 +345,4 @@ TEST_CASE("the sentence of a finished job", "[report]") {
   CHECK_THAT(done_text(record), Contains("; ") && Contains(" % of the space in reach known after 24 views"));
   record.hand_eye.reset();
   CHECK_THAT(done_text(record), Catch::Matchers::Matches("^[0-9.]+ % of the space.*"));
-}
-
-TEST_CASE("roll, pitch and yaw where they are not unique", "[report]") {
-  for (const double pitch : {M_PI / 2, -M_PI / 2}) {
-    const Eigen::Matrix3d r =
-        (Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
-         Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()))
-            .toRotationMatrix();
-    const Eigen::Vector3d rpy = roll_pitch_yaw(r);
-    const Eigen::Matrix3d again =
-        (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-         Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-            .toRotationMatrix();
-    CHECK(again.isApprox(r, 1e-6));
-  }
-}
-
-TEST_CASE("the scene for base_link is the map turned by half a turn", "[report]") {
-  const AxisBox box{{0.5, 0.2, 0.0}, {0.6, 0.4, 0.3}};
-  const std::vector<NamedFile> files = ros_scene_files(std::span(&box, 1));
-  REQUIRE(files.size() == 2);
-  const AxisBox turned{{-0.6, -0.4, 0.0}, {-0.5, -0.2, 0.3}};
-  const std::string in_base = files[1].text.substr(files[1].text.find('\n'));
-  const std::string of_turned = ros_scene_files(std::span(&turned, 1))[1].text;
-  CHECK(files[0].text.substr(files[0].text.find('\n')) == of_turned.substr(of_turned.find('\n')));
-  CHECK(files[0].text.substr(files[0].text.find('\n')) != in_base);
 }

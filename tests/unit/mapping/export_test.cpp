@@ -57,7 +57,7 @@ TEST_CASE("the point cloud holds the occupied voxels' centres", "[mapping][expor
 TEST_CASE("merged boxes cover exactly the occupied voxels, each once", "[mapping][export]") {
   for (const double fraction : {0.0, 0.3, 0.9}) {
     const VoxelMap map = random_map(fraction, 2);
-    const std::vector<AxisBox> boxes = merge_occupied(map);
+    const std::vector<AxisBox> boxes = merge_occupied(map, octomap_class);
     for (std::size_t i = 0; i < map.size(); ++i) {
       const Eigen::Vector3d c = map.geometry().center_m(map.geometry().voxel_at(i));
       int covers = 0;
@@ -69,13 +69,25 @@ TEST_CASE("merged boxes cover exactly the occupied voxels, each once", "[mapping
   }
 }
 
+TEST_CASE("boxes for planning also cover free voxels in which a surface is left", "[mapping][export]") {
+  VoxelMap map(GridGeometry{0.1, {0, 0, 0}, {5, 3, 1}});
+  for (std::size_t i = 0; i < map.size(); ++i) map.set(i, VoxelClass::kFree, 0);
+  for (const int x : {0, 1, 3, 4}) map.set(map.geometry().index({x, 1, 0}), VoxelClass::kOccupied, 0);
+  map.note_surface(map.geometry().index({2, 1, 0}), 6);  // a panel with a hole in it
+  CHECK(merge_occupied(map, octomap_class).size() == 2);
+  const std::vector<AxisBox> boxes = merge_occupied(map, collision_class);
+  REQUIRE(boxes.size() == 1);
+  CHECK(boxes[0].low_m.isApprox(Eigen::Vector3d(0.0, 0.1, 0.0)));
+  CHECK(boxes[0].high_m.isApprox(Eigen::Vector3d(0.5, 0.2, 0.1)));
+}
+
 TEST_CASE("a solid block is one box", "[mapping][export]") {
   VoxelMap map(GridGeometry{0.1, {0, 0, 0}, {6, 6, 6}});
   for (std::size_t i = 0; i < map.size(); ++i) {
     const Eigen::Vector3i v = map.geometry().voxel_at(i);
     if (v.x() >= 1 && v.x() < 4 && v.y() >= 2 && v.y() < 6 && v.z() < 2) map.set(i, VoxelClass::kOccupied, 0);
   }
-  const std::vector<AxisBox> boxes = merge_occupied(map);
+  const std::vector<AxisBox> boxes = merge_occupied(map, octomap_class);
   REQUIRE(boxes.size() == 1);
   CHECK(boxes[0].low_m.isApprox(Eigen::Vector3d(0.1, 0.2, 0.0)));
   CHECK(boxes[0].high_m.isApprox(Eigen::Vector3d(0.4, 0.6, 0.2)));

@@ -1,5 +1,6 @@
 #include "algorithms/mapping/octree_writer.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -80,7 +81,7 @@ TEST_CASE("OctoMap reads our .bt back voxel for voxel, and writes the same bytes
   Random random(1);
   for (int round = 0; round < 3; ++round) {
     const VoxelMap map = blocky_map(random);
-    const std::string text = collect([&](ByteSink sink) { write_bt(map, kOctreeDepth, sink); });
+    const std::string text = collect([&](ByteSink sink) { write_bt(map, octomap_class, kOctreeDepth, sink); });
     const auto tree = read_bt(text);
     require_equal(map, *tree);
     octomap::OcTree built = build_tree(map);
@@ -113,7 +114,7 @@ TEST_CASE("a coarser tree has what OctoMap's inner nodes say", "[mapping][octoma
   const octomap::OcTree full = build_tree(map);
   for (const int depth : {15, 14, 12, 3, 1}) {
     const auto ot = read_ot(collect([&](ByteSink sink) { write_ot(map, depth, sink); }));
-    const auto bt = read_bt(collect([&](ByteSink sink) { write_bt(map, depth, sink); }));
+    const auto bt = read_bt(collect([&](ByteSink sink) { write_bt(map, octomap_class, depth, sink); }));
     CHECK(ot->size() < full.size());
     for (const auto* tree : {ot.get(), bt.get()})
       for (auto leaf = tree->begin_leafs(); leaf != tree->end_leafs(); ++leaf)
@@ -134,8 +135,45 @@ TEST_CASE("a coarser tree has what OctoMap's inner nodes say", "[mapping][octoma
 
 TEST_CASE("a map that knows nothing is an empty tree", "[mapping][octomap]") {
   const VoxelMap map(GridGeometry{0.05, {0, 0, 0}, {8, 8, 8}});
-  CHECK(read_bt(collect([&](ByteSink sink) { write_bt(map, kOctreeDepth, sink); }))->size() == 0);
+  CHECK(read_bt(collect([&](ByteSink sink) { write_bt(map, octomap_class, kOctreeDepth, sink); }))->size() == 0);
   CHECK(read_ot(collect([&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); }))->size() == 0);
+}
+
+TEST_CASE("a collision map has no hole where a surface is left in a voxel of class free", "[mapping][octomap]") {
+  Random random(4);
+  VoxelMap map = blocky_map(random);
+  const std::string ot = collect([&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); });
+  const std::string by_classes = collect([&](ByteSink sink) { write_bt(map, octomap_class, kOctreeDepth, sink); });
+  std::vector<bool> holds(map.size(), false);
+  for (int n = 0; n < 300; ++n) {
+    const auto at = static_cast<std::size_t>(random.below(static_cast<int>(map.size())));
+    if (map.voxel_class(at) != VoxelClass::kFree) continue;
+    map.note_surface(at, static_cast<unsigned>(random.below(8)));
+    holds[at] = true;
+  }
+  REQUIRE(std::count(holds.begin(), holds.end(), true) > 20);
+  const auto tree = read_bt(collect([&](ByteSink sink) { write_bt(map, collision_class, kOctreeDepth, sink); }));
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const Eigen::Vector3d c = map.geometry().center_m(map.geometry().voxel_at(i));
+    const auto* node = tree->search(c.x(), c.y(), c.z());
+    REQUIRE((node == nullptr) == (map.voxel_class(i) == VoxelClass::kUnknown));
+    if (node == nullptr) continue;
+    REQUIRE(tree->isNodeOccupied(node) == (holds[i] || map.voxel_class(i) == VoxelClass::kOccupied));
+  }
+  // OctoMap's own files say what they said.
+  CHECK(collect([&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); }) == ot);
+  CHECK(collect([&](ByteSink sink) { write_bt(map, octomap_class, kOctreeDepth, sink); }) == by_classes);
+}
+
+TEST_CASE("a voxel that a ray has crossed again is free in a collision map, too", "[mapping][octomap]") {
+  VoxelMap map(GridGeometry{0.05, {0, 0, 0}, {2, 2, 2}});
+  map.set(3, VoxelClass::kFree, 0);
+  map.note_surface(3, 5);
+  CHECK(collision_class(map, 3) == VoxelClass::kOccupied);
+  CHECK(octomap_class(map, 3) == VoxelClass::kFree);
+  map.note_crossed(3, 1U << 5);
+  CHECK(collision_class(map, 3) == VoxelClass::kFree);
+  CHECK(collision_class(map, 0) == VoxelClass::kUnknown);
 }
 
 }  // namespace firstlook
