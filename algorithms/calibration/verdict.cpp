@@ -7,6 +7,7 @@
 #include <functional>
 #include <numeric>
 
+#include "algorithms/calibration/mistakes/placement_mistakes.hpp"
 #include "algorithms/calibration/view_gate.hpp"
 #include "algorithms/vision/board_pose.hpp"
 #include "algorithms/vision/camera_model.hpp"
@@ -156,6 +157,29 @@ void validate(const Validation& validation, const HandEyeOptions& options, HandE
   judge(options.limits, failed, options.subset_solves, result);
 }
 
+/// Says what is wrong with the data where that can be told: with the whole of a rejected set, or with single views that
+/// were left out.
+void name_mistake(std::span<const PosePair> pairs, const BoardSpec* board, const std::function<MistakeSearch()>& search,
+                  HandEyeResult& result) {
+  result.likely_mistake.reset();
+  std::vector<bool> kept;
+  for (const ViewFit& fit : result.fits) kept.push_back(fit.used);
+  if (result.verdict == Verdict::kRejected) {
+    MistakeSearch found = search();
+    result.likely_mistake = std::move(found.found);
+    if (!result.likely_mistake && found.tried > 0) result.reasons.push_back(found.sentence());
+  }
+  if (!result.likely_mistake && pairs.size() == kept.size()) {
+    std::string text = mistakes::explain_left_out(pairs, kept, result.flange_T_camera, board);
+    if (!text.empty()) {
+      result.likely_mistake = LikelyMistake{Mistake::kSingleViews, "likely mistake: " + std::move(text), {}, {}};
+    }
+  }
+  if (result.likely_mistake && result.verdict == Verdict::kRejected) {
+    result.reasons.push_back(result.likely_mistake->text);
+  }
+}
+
 HandEyeResult start_result(const Refinement& refinement, std::span<const PosePair> used_pairs) {
   HandEyeResult result;
   result.flange_T_camera = refinement.flange_T_camera;
@@ -272,6 +296,12 @@ void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, s
     return squared_error_px(camera, board, used.views[i], r.flange_T_camera, r.base_T_board);
   };
   validate(validation, options, result);
+  std::vector<PosePair> all;
+  for (const CalibrationView& view : views) {
+    const auto pose = estimate_board_pose_robust(camera, board, view.points());
+    if (pose) all.push_back({view.base_T_flange, pose->pose.camera_T_board});
+  }
+  name_mistake(all, &board, [&] { return find_likely_mistake(camera, board, views); }, result);
 }
 
 Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
@@ -301,6 +331,7 @@ Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pa
     return refine_from_pairs(some, result.flange_T_camera, quick);
   };
   validate(validation, options, result);
+  name_mistake(pairs, nullptr, [&] { return find_likely_mistake(pairs); }, result);
   return result;
 }
 
