@@ -205,14 +205,19 @@ struct Reading {
 Reading best_reading(const Misreading& m, std::span<const Eigen::Matrix3d> read, const PositionsFit& positions,
                      std::size_t anchor, std::size_t needed) {
   const std::size_t n = read.size(), misses_max = n - needed;
+  constexpr std::size_t kFirstLook = 3;  // most of the 180,000 meanings end here; another anchor gives a second chance
   Reading best, reading;
   for (const Eigen::Matrix3d& meaning : meanings(m, read[anchor])) {
     const Eigen::Matrix3d common = positions.rotation_for[anchor].transpose() * meaning;
     reading.explained = 0;
     reading.meant.clear();
+    std::size_t others = 0;
     for (std::size_t i = 0; i < n && i - reading.explained <= misses_max; ++i) {
+      if (i == kFirstLook && others == 0) break;
       reading.meant.push_back(meant_near(m, read[i], positions.rotation_for[i] * common));
-      if (reading.meant.back()) ++reading.explained;
+      if (!reading.meant.back()) continue;
+      ++reading.explained;
+      if (i != anchor) ++others;
     }
     if (reading.explained >= needed && reading.explained > best.explained) best = reading;
   }

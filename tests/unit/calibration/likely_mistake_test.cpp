@@ -15,7 +15,7 @@ using test::Setup;
 
 namespace {
 
-constexpr std::uint64_t kSeeds = 12;
+constexpr std::uint64_t kSeeds = 6;
 
 using Pairs = std::vector<PosePair>;
 using Views = std::vector<CalibrationView>;
