@@ -15,7 +15,7 @@ using test::Setup;
 
 namespace {
 
-constexpr std::uint64_t kSeeds = 6;
+constexpr std::uint64_t kSeeds = 4;
 
 using Pairs = std::vector<PosePair>;
 using Views = std::vector<CalibrationView>;
@@ -322,7 +322,7 @@ TEST_CASE("likely mistake: single views that were left out are explained", "[cal
 
 TEST_CASE("likely mistake: good data is never accused, however noisy or few", "[calibration][mistake]") {
   int searched = 0;
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
     CAPTURE(seed);
     Setup setup;
     Random random(seed, 95);
@@ -341,5 +341,5 @@ TEST_CASE("likely mistake: good data is never accused, however noisy or few", "[
     CHECK_FALSE(from_views.found);
     searched += from_pairs.tried > 0 ? 1 : 0;
   }
-  CHECK(searched > 20);
+  CHECK(searched > 10);
 }
