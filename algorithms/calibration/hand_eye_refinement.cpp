@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "algorithms/calibration/arm_sigma.hpp"
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/bundle.hpp"
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
 #include "algorithms/calibration/view_gate.hpp"
@@ -40,18 +41,26 @@ Status check_input(const CameraIntrinsics& camera, const BoardSpec& board, std::
   return {};
 }
 
-/// Corners are weighed against the view's own board pose, where neither the arm nor other views can mislead.
+/// Corners are weighed against the view's own board pose, where neither the arm nor other views can mislead; which of
+/// two poses that is, when a picture allows both, the views settle under the start.
 std::vector<PreparedView> prepare(const CameraIntrinsics& camera, const BoardSpec& board,
-                                  std::span<const CalibrationView> views, const RefinementOptions& options) {
+                                  std::span<const CalibrationView> views, const Transform<Flange, Camera>& start,
+                                  const RefinementOptions& options) {
   std::vector<PreparedView> prepared;
+  std::vector<OpenView> open;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto seen = estimate_board_pose_robust(camera, board, views[i].points(), kBoardResidualMax_px,
                                            options.corner_loss_scale, options.corner_sigma_min_px);
     if (!seen) continue;
+    open.push_back(seen_one_way(views[i], seen->pose));
     prepared.push_back({i,
                         {views[i].base_T_flange, seen->pose.camera_T_board},
                         std::move(seen->residuals_px),
                         std::move(seen->weights)});
+  }
+  const auto choices = settle_choices(open, start);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    prepared[i].pair.camera_T_board = open[i].choices[choices[i]].camera_T_board;
   }
   return prepared;
 }
@@ -195,7 +204,7 @@ Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const BoardSp
                                    std::span<const CalibrationView> views, const Transform<Flange, Camera>& start,
                                    const RefinementOptions& options) {
   if (const Status fine = check_input(camera, board, views, start); !fine) return std::unexpected(fine.error());
-  std::vector<PreparedView> prepared = prepare(camera, board, views, options);
+  std::vector<PreparedView> prepared = prepare(camera, board, views, start, options);
   if (prepared.size() < 3) {
     return failure(Fault::kTooFewViews, "{} of {} views show the board, 3 are the least", prepared.size(),
                    views.size());

@@ -8,6 +8,7 @@
 #include <functional>
 #include <numeric>
 
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/mistakes/placement_mistakes.hpp"
 #include "algorithms/calibration/unobservable.hpp"
 #include "algorithms/calibration/view_gate.hpp"
@@ -222,7 +223,8 @@ HandEyeResult start_result(const Refinement& refinement, std::span<const PosePai
   return result;
 }
 
-/// Views and their pose pairs that `fits` calls used (all that show a board when it is empty).
+/// Views and their pose pairs that `fits` calls used (all that show a board when it is empty), the pairs settled among
+/// the poses that each picture allows.
 struct UsedViews {
   Indices given;
   std::vector<CalibrationView> views;
@@ -230,15 +232,21 @@ struct UsedViews {
 };
 
 UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
-                       std::span<const ViewFit> fits) {
+                       std::span<const ViewFit> fits,
+                       const std::optional<Transform<Flange, Camera>>& flange_T_camera = {}) {
   UsedViews used;
+  std::vector<OpenView> open;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i < fits.size() && !fits[i].used) continue;
     const auto pose = estimate_board_pose_robust(camera, board, views[i].points());
     if (!pose) continue;
     used.given.push_back(i);
     used.views.push_back(views[i]);
-    used.pairs.push_back({views[i].base_T_flange, pose->pose.camera_T_board});
+    open.push_back(seen_one_way(views[i], pose->pose));
+  }
+  const auto choices = flange_T_camera ? settle_choices(open, *flange_T_camera) : settle_choices(open);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    used.pairs.push_back({open[i].base_T_flange, open[i].choices[choices[i]].camera_T_board});
   }
   return used;
 }
@@ -294,7 +302,8 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Board
   if (!start) return name_unobservable(start.error(), seen.pairs);
   const auto refinement = refine_hand_eye(camera, board, views, start->flange_T_camera, options.refinement);
   if (!refinement) return name_unobservable(refinement.error(), seen.pairs);
-  HandEyeResult result = start_result(*refinement, select_views(camera, board, views, refinement->views).pairs);
+  HandEyeResult result = start_result(
+      *refinement, select_views(camera, board, views, refinement->views, refinement->flange_T_camera).pairs);
   result.closed_form = start->flange_T_camera;
   result.closed_form_raw = start->raw_flange_T_camera;
   return result;
@@ -302,7 +311,7 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Board
 
 void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result) {
-  const UsedViews used = select_views(camera, board, views, result.fits);
+  const UsedViews used = select_views(camera, board, views, result.fits, result.flange_T_camera);
   const RefinementOptions quick = short_options(options, result);
   Validation validation;
   validation.pairs = used.pairs;
@@ -321,11 +330,7 @@ void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, s
     return squared_error_px(camera, board, used.views[i], r.flange_T_camera, r.base_T_board);
   };
   validate(validation, options, result);
-  std::vector<PosePair> all;
-  for (const CalibrationView& view : views) {
-    const auto pose = estimate_board_pose_robust(camera, board, view.points());
-    if (pose) all.push_back({view.base_T_flange, pose->pose.camera_T_board});
-  }
+  const std::vector<PosePair> all = select_views(camera, board, views, {}, result.flange_T_camera).pairs;
   name_mistake(all, &board, [&] { return find_likely_mistake(camera, board, views); }, result);
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/chi_square.hpp"
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
 #include "algorithms/calibration/verdict.hpp"
@@ -170,6 +171,23 @@ double largest_deviation(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()(2)));
 }
 
+/// The views that show a board, each with the one of its poses that agrees with the others.
+std::vector<SeenView> settled_views(const CameraIntrinsics& camera, const BoardSpec& board,
+                                    std::span<const CalibrationView> views,
+                                    const Transform<Flange, Camera>& flange_T_camera) {
+  std::vector<SeenView> seen;
+  std::vector<OpenView> open;
+  for (const CalibrationView& view : views) {
+    const auto pose = estimate_board_pose_robust(camera, board, view.points());
+    if (!pose) continue;
+    seen.push_back({&view, pose->pose});
+    open.push_back(seen_one_way(view, pose->pose));
+  }
+  const auto choices = settle_choices(open, flange_T_camera);
+  for (std::size_t i = 0; i < seen.size(); ++i) adopt_choice(board, open[i].choices[choices[i]], seen[i].pose);
+  return seen;
+}
+
 }  // namespace
 
 DetectableError detectable_error(const Matrix6d& views_covariance, const Matrix6d& claim_covariance, int views,
@@ -185,11 +203,7 @@ DetectableError detectable_error(const Matrix6d& views_covariance, const Matrix6
 Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
                                      std::span<const CalibrationView> views, const HandEyeClaim& stated,
                                      const VerificationLimits& limits) {
-  std::vector<SeenView> seen;
-  for (const CalibrationView& view : views) {
-    const auto pose = estimate_board_pose_robust(camera, board, view.points());
-    if (pose) seen.push_back({&view, pose->pose});
-  }
+  const std::vector<SeenView> seen = settled_views(camera, board, views, stated.flange_T_camera);
   const auto count = static_cast<int>(seen.size());
   if (count < std::max(2, limits.views_min)) {
     return failure(Fault::kTooFewViews, "{} usable views of the board, {} are the least", count, limits.views_min);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "algorithms/mapping/octants.hpp"
 #include "algorithms/mapping/passed_voxels.hpp"
 #include "algorithms/mapping/ray_marker.hpp"
 #include "platform/core/ensure.hpp"
@@ -22,33 +23,36 @@ constexpr double kResolutionMin_m = 0.001;    // float points resolve it to a th
   return towards_zero - static_cast<std::int32_t>(static_cast<double>(towards_zero) > value);
 }
 
-/// Where octomap_voxel() puts the ends of a row, as indices; -1 outside the grid. Ends lie within OctoMap's keys.
-[[gnu::always_inline]] inline void compute_indices(const GridGeometry& geometry, const float* const ends[3],
-                                                   std::size_t count, std::int32_t* indices) {
-  const double factor = 1.0 / geometry.resolution_m;
+/// Where octomap_voxel() and octant_of() put the ends of a row: 8 * index + octant, -1 outside the grid. Ends lie
+/// within OctoMap's keys. A factor of two rounds nothing, so that half coordinates hold the voxel's.
+[[gnu::always_inline]] inline void compute_octants(const GridGeometry& geometry, const float* const ends[3],
+                                                   std::size_t count, std::int32_t* octants) {
+  const double halves = 2.0 / geometry.resolution_m;
   const std::int32_t nx = geometry.size.x(), ny = geometry.size.y(), nz = geometry.size.z();
   const std::int32_t x0 = geometry.first.x(), y0 = geometry.first.y(), z0 = geometry.first.z();
   for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t x = floor_of(factor * static_cast<double>(ends[0][i])) - x0;
-    const std::int32_t y = floor_of(factor * static_cast<double>(ends[1][i])) - y0;
-    const std::int32_t z = floor_of(factor * static_cast<double>(ends[2][i])) - z0;
+    const std::int32_t hx = floor_of(halves * static_cast<double>(ends[0][i]));
+    const std::int32_t hy = floor_of(halves * static_cast<double>(ends[1][i]));
+    const std::int32_t hz = floor_of(halves * static_cast<double>(ends[2][i]));
+    const std::int32_t x = (hx >> 1) - x0, y = (hy >> 1) - y0, z = (hz >> 1) - z0;
     const int inside = static_cast<int>(x >= 0) & static_cast<int>(x < nx) & static_cast<int>(y >= 0) &
                        static_cast<int>(y < ny) & static_cast<int>(z >= 0) & static_cast<int>(z < nz);
-    indices[i] = inside != 0 ? (z * ny + y) * nx + x : -1;
+    const std::int32_t octant = (hx & 1) | (hy & 1) << 1 | (hz & 1) << 2;
+    octants[i] = inside != 0 ? ((z * ny + y) * nx + x) << 3 | octant : -1;
   }
 }
-FIRSTLOOK_AVX2 void compute_indices_avx2(const GridGeometry& geometry, const float* const ends[3], std::size_t count,
-                                         std::int32_t* indices) {
-  compute_indices(geometry, ends, count, indices);
+FIRSTLOOK_AVX2 void compute_octants_avx2(const GridGeometry& geometry, const float* const ends[3], std::size_t count,
+                                         std::int32_t* octants) {
+  compute_octants(geometry, ends, count, octants);
 }
-void compute_indices_portable(const GridGeometry& geometry, const float* const ends[3], std::size_t count,
-                              std::int32_t* indices) {
-  compute_indices(geometry, ends, count, indices);
+void compute_octants_portable(const GridGeometry& geometry, const float* const ends[3], std::size_t count,
+                              std::int32_t* octants) {
+  compute_octants(geometry, ends, count, octants);
 }
-void end_indices(const GridGeometry& geometry, const RayRow& row, std::span<std::int32_t> indices) {
+void end_octants(const GridGeometry& geometry, const RayRow& row, std::span<std::int32_t> octants) {
   const float* const ends[3] = {row.end_x_m.data(), row.end_y_m.data(), row.end_z_m.data()};
-  has_avx2() ? compute_indices_avx2(geometry, ends, indices.size(), indices.data())
-             : compute_indices_portable(geometry, ends, indices.size(), indices.data());
+  has_avx2() ? compute_octants_avx2(geometry, ends, octants.size(), octants.data())
+             : compute_octants_portable(geometry, ends, octants.size(), octants.data());
 }
 
 }  // namespace
@@ -56,9 +60,9 @@ void end_indices(const GridGeometry& geometry, const RayRow& row, std::span<std:
 Inserter::Inserter(const GridGeometry& geometry, const DepthSensor& sensor)
     : geometry_(geometry), rays_(sensor), image_(sensor.intrinsics.width, sensor.intrinsics.height) {
   ENSURE(3021, geometry.resolution_m >= kResolutionMin_m && (geometry.size.array() > 0).all());
-  ENSURE(3025, geometry.count() <= std::numeric_limits<std::int32_t>::max());
+  ENSURE(3025, geometry.count() <= std::numeric_limits<std::int32_t>::max() / 8);
   row_reach_m_.resize(static_cast<std::size_t>(sensor.intrinsics.width));
-  row_index_.resize(row_reach_m_.size());
+  row_octant_.resize(row_reach_m_.size());
   missed_.assign(VoxelMap::bit_words(geometry), 0);
   hit_.assign(VoxelMap::bit_words(geometry), 0);
 }
@@ -87,38 +91,49 @@ Result<InsertionResult> Inserter::insert(VoxelMap& map, const DepthImage& depth,
   std::fill(hit_.begin(), hit_.end(), 0);
   InsertionResult result;
   if (rays_.is_pinhole())
-    mark_by_voxels(depth, base_T_depth, self_depth_m, result);
+    mark_by_voxels(map, depth, base_T_depth, self_depth_m, result);
   else
-    mark_by_rays(depth, base_T_depth, self_depth_m, result);
+    mark_by_rays(map, depth, base_T_depth, self_depth_m, result);
   result.change = map.apply(missed_, hit_, base_T_depth, stamp_s);
+  note_crossed_octants(map, missed_, hit_, image_, rays_.sensor(), rays_.is_pinhole(), base_T_depth);
   return result;
 }
 
-void Inserter::mark_hit(std::int32_t index) {
-  if (index < 0) return;
-  hit_[static_cast<std::size_t>(index) >> 6] |= 1ULL << (index & 63);
+void Inserter::mark_hit(VoxelMap& map, std::int32_t octant) {
+  if (octant < 0) return;
+  const auto index = static_cast<std::size_t>(octant) >> 3;
+  hit_[index >> 6] |= 1ULL << (index & 63);
+  map.note_surface(index, static_cast<unsigned>(octant) & 7U);
 }
 
-void Inserter::mark_by_rays(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+void Inserter::note_reach(int v, const RayRow& row) {
+  for (std::size_t u = 0; u < row.kind.size(); ++u) {
+    row_reach_m_[u] = row.kind[u] <= PixelKind::kBeyond ? row.reach_m[u] : RangeImage::kNoRay;
+  }
+  image_.set_row(v, row_reach_m_);
+}
+
+void Inserter::mark_by_rays(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                             std::span<const float> self_depth_m, PixelCounts& counts) {
   RayMarker marker(geometry_, base_T_depth.translation().cast<float>(), missed_);
-  counts = rays_.for_each(depth, base_T_depth, self_depth_m, [&](const RayEnd& ray) {
-    marker.mark_passed(ray.end_m);
-    const Eigen::Vector3i voxel = octomap_voxel(geometry_, ray.end_m);
-    if (ray.is_hit && geometry_.contains(voxel)) mark_hit(static_cast<std::int32_t>(geometry_.index(voxel)));
+  counts = rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) {
+    note_reach(v, row);
+    end_octants(geometry_, row, row_octant_);
+    for (std::size_t u = 0; u < row.kind.size(); ++u) {
+      if (row.kind[u] > PixelKind::kBeyond) continue;
+      marker.mark_passed({row.end_x_m[u], row.end_y_m[u], row.end_z_m[u]});
+      if (row.kind[u] == PixelKind::kHit) mark_hit(map, row_octant_[u]);
+    }
   });
 }
 
-void Inserter::mark_by_voxels(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+void Inserter::mark_by_voxels(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                               std::span<const float> self_depth_m, PixelCounts& counts) {
   counts = rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) {
+    note_reach(v, row);
+    end_octants(geometry_, row, row_octant_);
     for (std::size_t u = 0; u < row.kind.size(); ++u) {
-      row_reach_m_[u] = row.kind[u] <= PixelKind::kBeyond ? row.reach_m[u] : RangeImage::kNoRay;
-    }
-    image_.set_row(v, row_reach_m_);
-    end_indices(geometry_, row, row_index_);
-    for (std::size_t u = 0; u < row.kind.size(); ++u) {
-      if (row.kind[u] == PixelKind::kHit) mark_hit(row_index_[u]);
+      if (row.kind[u] == PixelKind::kHit) mark_hit(map, row_octant_[u]);
     }
   });
   image_.build_levels();

@@ -34,18 +34,19 @@ class Inserter {
 
  private:
   [[nodiscard]] Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
-  void mark_hit(std::int32_t index);
+  void mark_hit(VoxelMap& map, std::int32_t octant);
+  void note_reach(int v, const RayRow& row);
   /// Two ways to the same marks: along every ray of any image, or by the voxels of a pinhole image (much faster).
-  void mark_by_rays(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+  void mark_by_rays(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                     std::span<const float> self_depth_m, PixelCounts& counts);
-  void mark_by_voxels(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+  void mark_by_voxels(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                       std::span<const float> self_depth_m, PixelCounts& counts);
 
   GridGeometry geometry_;
   DepthRays rays_;
   RangeImage image_;
   std::vector<float> row_reach_m_;
-  std::vector<std::int32_t> row_index_;
+  std::vector<std::int32_t> row_octant_;  ///< 8 * voxel + octant of each end; -1 outside the grid
   std::vector<std::uint64_t> missed_;
   std::vector<std::uint64_t> hit_;
 };

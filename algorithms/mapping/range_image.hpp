@@ -33,6 +33,9 @@ class RangeImage {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] int tiles_x() const { return levels_.front().width; }
+  [[nodiscard]] float at(int u, int v) const {
+    return tile(u / kTile, v / kTile)[static_cast<std::size_t>(v % kTile * kTile + u % kTile)];
+  }
   /// All pixels, tile by tile, each row by row.
   [[nodiscard]] std::span<const float> reach_m() const { return reach_m_; }
   [[nodiscard]] std::span<const float> tile(int x, int y) const {

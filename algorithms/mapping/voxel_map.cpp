@@ -51,6 +51,7 @@ VoxelMap::VoxelMap(const GridGeometry& geometry, Planes planes) : geometry_(geom
   log_odds_.assign(geometry.count(), kUnknownLogOdds);
   if (planes == Planes::kLogOddsOnly) return;
   flags_.assign(geometry.count(), 0);
+  octants_.assign(geometry.count(), {});
   first_free_pose_.assign(geometry.count(), 0);
   seen_s_.assign(geometry.count(), 0);
   poses_.reserve(kPosesMax);
@@ -59,8 +60,8 @@ VoxelMap::VoxelMap(const GridGeometry& geometry, Planes planes) : geometry_(geom
 
 std::size_t VoxelMap::required_bytes(const GridGeometry& geometry, Planes planes) {
   if (planes == Planes::kLogOddsOnly) return geometry.count();
-  return geometry.count() *
-             (sizeof(std::int8_t) + sizeof(std::uint8_t) + sizeof(std::uint16_t) + sizeof(std::uint32_t)) +
+  return geometry.count() * (sizeof(std::int8_t) + sizeof(std::uint8_t) + sizeof(Octants) + sizeof(std::uint16_t) +
+                             sizeof(std::uint32_t)) +
          kPosesMax * (sizeof(SeenFrom) + 1);
 }
 
@@ -86,6 +87,7 @@ bool VoxelMap::known_free(std::size_t index, double now_s, double free_max_age_s
   const std::int8_t value = log_odds_[index];
   if (value == kUnknownLogOdds || value > kKnownFreeLogOdds) return false;
   if ((flags_[index] & (kFreeFromTwoPoses | kHitInLatestFrame | kForgotten)) != kFreeFromTwoPoses) return false;
+  if (octants_[index].not_crossed() != 0) return false;
   const double age_s = now_s - static_cast<double>(seen_s_[index]);
   return age_s >= 0 && age_s <= free_max_age_s;
 }
@@ -227,6 +229,8 @@ void VoxelMap::set(std::size_t index, VoxelClass voxel_class, double stamp_s) {
   if (voxel_class == VoxelClass::kFree) flags_[index] |= kFreeFromTwoPoses;
   if (voxel_class == VoxelClass::kOccupied) flags_[index] |= kHitInLatestFrame;
   if (voxel_class == VoxelClass::kOccupied && (flags_[index] & kInSafeZone) != 0) flags_[index] |= kZoneRevoked;
+  octants_[index] = {.surface = static_cast<std::uint8_t>(voxel_class == VoxelClass::kOccupied ? 0xFF : 0),
+                     .crossed = static_cast<std::uint8_t>(voxel_class == VoxelClass::kFree ? 0xFF : 0)};
   first_free_pose_[index] = 0;
   seen_s_[index] = static_cast<std::uint32_t>(stamp_s);
 }

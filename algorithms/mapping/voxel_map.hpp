@@ -48,6 +48,13 @@ struct HalfSpace {
   double offset_m = 0;
 };
 
+/// The eighths of one voxel (octants.hpp), one bit each.
+struct Octants {
+  std::uint8_t surface = 0;  ///< a surface was hit here, and no ray has crossed it since
+  std::uint8_t crossed = 0;  ///< a ray has crossed it, and no surface was hit here since
+  [[nodiscard]] std::uint8_t not_crossed() const { return static_cast<std::uint8_t>(~crossed); }
+};
+
 /// What one frame changed.
 struct FrameChange {
   std::size_t voxels_missed = 0;      ///< seen free in this frame
@@ -66,7 +73,7 @@ class VoxelMap {
  public:
   enum class Planes : std::uint8_t {
     kAll,
-    kLogOddsOnly,  ///< an eighth of the memory; nothing is ever known free and there is no safe zone: for offline maps
+    kLogOddsOnly,  ///< a tenth of the memory; nothing is ever known free and there is no safe zone: for offline maps
   };
   explicit VoxelMap(const GridGeometry& geometry, Planes planes = Planes::kAll);
 
@@ -84,8 +91,8 @@ class VoxelMap {
   [[nodiscard]] VoxelCounts counts() const;
 
   /// Safety rule 1: log-odds at most -22, seen free from two different poses, no hit in the latest frame that saw the
-  /// voxel, seen within `free_max_age_s` before `now_s` (a stamp in the future is refused), and seen since
-  /// forget_known_free().
+  /// voxel, seen within `free_max_age_s` before `now_s` (a stamp in the future is refused), seen since
+  /// forget_known_free(), and every octant crossed by a ray since a surface was hit there.
   [[nodiscard]] bool known_free(std::size_t index, double now_s, double free_max_age_s) const;
 
   /// One byte for each voxel, 1 where motion may be: known free or intact safe zone, and not blocked.
@@ -105,6 +112,21 @@ class VoxelMap {
 
   /// Safety rule 7, after a stop, long pause or restart: nothing is known free until it is seen free again.
   void forget_known_free();
+
+  [[nodiscard]] Octants octants(std::size_t index) const { return has_motion_planes() ? octants_[index] : Octants{}; }
+  /// Whether a surface was hit in a part of the voxel that no ray has crossed since, whatever its log-odds say.
+  [[nodiscard]] bool holds_surface(std::size_t index) const { return octants(index).surface != 0; }
+  void note_surface(std::size_t index, unsigned octant) {
+    if (!has_motion_planes()) return;
+    octants_[index].surface = static_cast<std::uint8_t>(octants_[index].surface | 1U << octant);
+    octants_[index].crossed = static_cast<std::uint8_t>(octants_[index].crossed & ~(1U << octant));
+  }
+  void note_crossed(std::size_t index, std::uint8_t crossed) {
+    if (!has_motion_planes()) return;
+    octants_[index].surface = static_cast<std::uint8_t>(octants_[index].surface & ~crossed);
+    octants_[index].crossed = static_cast<std::uint8_t>(octants_[index].crossed | crossed);
+  }
+  [[nodiscard]] bool has_motion_planes() const { return !flags_.empty(); }
 
   /// Applies one frame: one update for each voxel, occupied before free, none at a clamp.
   /// @param missed, hit  bit i of word i / 64 is voxel i; bit_words(geometry) words
@@ -144,11 +166,11 @@ class VoxelMap {
   void mark_different_poses(const Transform<Base, Depth>& base_T_depth);
   void miss(std::size_t index, const Frame& frame, FrameChange& change);
   void hit(std::size_t index, const Frame& frame, FrameChange& change);
-  [[nodiscard]] bool has_motion_planes() const { return !flags_.empty(); }
 
   GridGeometry geometry_;
   std::vector<std::int8_t> log_odds_;
   std::vector<std::uint8_t> flags_;
+  std::vector<Octants> octants_;
   std::vector<std::uint16_t> first_free_pose_;  ///< index into poses_ plus 1; 0 is none
   std::vector<std::uint32_t> seen_s_;           ///< stamp of the latest frame that saw the voxel
   std::vector<SeenFrom> poses_;

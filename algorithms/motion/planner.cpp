@@ -58,9 +58,25 @@ Status Planner::begin(const ArmModel& arm, const Body& body, const FreeSpace& sp
   }
   from_start_.clear();
   from_start_.push_back({.q = start});
+  trail_nodes_ = 1;
   const Certificate standing = check(start, start);
   if (!standing.certified()) return blocked(Fault::kStartBlocked, "start", body, standing);
+  follow_trail();
   return {};
+}
+
+/// From the latest back, each configuration from the nearest one that is reached.
+void Planner::follow_trail() {
+  for (auto q = options_.trail.rbegin(); q != options_.trail.rend() && from_start_.size() < nodes_max_ / 4; ++q) {
+    const int from = nearest(from_start_, *q);
+    if (from_start_[static_cast<std::size_t>(from)].q == *q) continue;
+    if (!configuration_is_free(*arm_, *body_, space_, clearance_, *q)) continue;
+    if (check(from_start_[static_cast<std::size_t>(from)].q, *q).certified()) {
+      from_start_.push_back({.q = *q, .parent = from});
+    }
+  }
+  trail_nodes_ = from_start_.size();
+  options_.trail = {};
 }
 
 Result<Path> Planner::plan_to(const JointVector& goal) {
@@ -140,9 +156,13 @@ JointVector Planner::sample(const JointVector& goal) {
 }
 
 bool Planner::search(const JointVector& goal) {
-  if (from_start_.size() > nodes_max_ / 2) from_start_.resize(1);  // make room: it was grown for other goals
+  if (from_start_.size() > nodes_max_ / 2) from_start_.resize(trail_nodes_);  // make room: it was grown for other goals
   from_goal_.clear();
   from_goal_.push_back({.q = goal});
+  if (const int met = connect(from_start_, goal); met >= 0) {
+    collect(met, 0);
+    return true;
+  }
   for (int i = 0; i < options_.iterations_max; ++i) {
     const bool grow_start = i % 2 == 0;
     Tree& tree = grow_start ? from_start_ : from_goal_;

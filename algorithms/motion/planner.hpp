@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "algorithms/kinematics/speed.hpp"
@@ -27,6 +28,9 @@ struct PlannerOptions {
   int shortcuts_max = 40;     ///< attempts
   double step_m = 0.35;       ///< longest edge, in joint distance weighted by lever arm
   SpeedLimits limits = {};    ///< for duration_s
+  /// Configurations by which the arm came here, the latest last; read by begin() only. Those that can still be reached
+  /// along them are there before the first sample: what was passed on the way out is the way back.
+  std::span<const JointVector> trail = {};
 };
 
 /// Plans from one start to one or several goals. Holds the nodes; does not allocate after construction.
@@ -59,6 +63,7 @@ class Planner {
   [[nodiscard]] int nearest(const Tree& tree, const JointVector& q) const;
   [[nodiscard]] int extend(Tree& tree, int from, const JointVector& towards) const;
   [[nodiscard]] int connect(Tree& tree, const JointVector& target) const;
+  void follow_trail();
   [[nodiscard]] JointVector sample(const JointVector& goal);
   [[nodiscard]] bool search(const JointVector& goal);
   void collect(int start_leaf, int goal_leaf);
@@ -70,6 +75,7 @@ class Planner {
 
   std::size_t nodes_max_;
   Tree from_start_;
+  std::size_t trail_nodes_ = 1;  ///< of from_start_: the start and the trail
   Tree from_goal_;
   std::vector<JointVector> chain_;  // the path found, start first
   const ArmModel* arm_ = nullptr;

@@ -177,6 +177,7 @@ Status ViewChooser::plan_best(const Task& task, ViewChoice& choice) {
   planning.seed = task.options.seed + task.options.step;
   planning.iterations_max = task.options.plan_iterations_max;
   planning.limits = timing.limits;
+  planning.trail = task.options.trail;
   const ViewContext& c = task.context;
   if (Status begun = planner_.begin(c.arm, c.body, c.space, c.clearance, task.current, planning); !begun) return begun;
   const int plans_max = task.options.plans_max * (task.certificate ? 2 : 1);

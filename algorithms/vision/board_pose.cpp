@@ -196,7 +196,7 @@ Result<BoardPose> estimate_board_pose(const CameraIntrinsics& camera, const Boar
   BoardPose result = to_board_pose(*best, coordinates);
   if (other && is_another(*best, *other)) {
     const BoardPose second = to_board_pose(*other, coordinates);
-    result.other = {second.camera_T_board, second.residual_rms_px};
+    result.other = {second.camera_T_board, second.residual_rms_px, second.unit_covariance};
   }
   if (!(result.residual_rms_px <= residual_max_px)) {
     return failure(Fault::kBoardNotFound, "corners off by {:.2f} px RMS from any pose of the board",

@@ -15,7 +15,8 @@ namespace firstlook {
 /// The second pose of a plane that looks nearly the same, its normal on the other side of the line of sight.
 struct OtherPose {
   Transform<Camera, Board> camera_T_board;
-  double residual_rms_px = 0;  ///< never less than the first's: how much less likely it is
+  double residual_rms_px = 0;  ///< of the estimate never less than the first's: how much less likely it is
+  Eigen::Matrix<double, 6, 6> unit_covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< as BoardPose's
 };
 
 struct BoardPose {
@@ -24,7 +25,7 @@ struct BoardPose {
   /// t = t_est + d_t, R = Exp(d_r) R_est.
   Eigen::Matrix<double, 6, 6> unit_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   double residual_rms_px = 0;      ///< for each coordinate
-  std::optional<OtherPose> other;  ///< of the planar ambiguity; empty when the points leave no doubt
+  std::optional<OtherPose> other;  ///< of the planar ambiguity; empty when both ways end in one pose
 };
 
 /// The other camera_T_board of a plane that looks nearly the same: its normal mirrored at the line of sight

@@ -2,6 +2,7 @@
 #include "algorithms/vision/circle_grid.hpp"
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -37,15 +38,17 @@ std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
   return Disc{{m.m10 / m.m00, m.m01 / m.m00}, std::sqrt(m.m00 / M_PI)};
 }
 
-void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
+/// False for a picture of noise, which it is at every window.
+bool add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
   constexpr double kDarker = 7;  // grey levels below the mean of the window
-  constexpr std::size_t kContoursMax = 20000;
   cv::Mat dark;
   cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
   std::vector<std::vector<cv::Point>> contours;
   std::vector<cv::Vec4i> tree;
   cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  if (contours.size() > kContoursMax) return;
+  // White noise has a contour for every 60 pixels, the densest grid that can be read for every 100.
+  constexpr std::size_t kPixelsMin = 100, kAlways = 6000;
+  if (contours.size() > std::max(kAlways, dark.total() / kPixelsMin)) return false;
   for (std::size_t i = 0; i < contours.size(); ++i) {
     constexpr int kParent = 3;
     if (tree[i][kParent] >= 0) continue;
@@ -53,6 +56,7 @@ void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
     const auto same = [&](const Disc& d) { return (d.center - disc->center).norm() < d.radius_px / 2; };
     if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);
   }
+  return true;
 }
 
 /// Centre of the darkness in a window around the disc: each pixel counts with the part of it that ink covers.
@@ -153,14 +157,68 @@ std::vector<std::size_t> find_grid(const std::vector<Disc>& discs, const BoardSp
   return best;
 }
 
-/// Where the image of a circle has its centre, less where the circle's centre is seen: from the dual conic.
-Eigen::Vector2d center_shift(const Eigen::Matrix3d& image_H_board, const Eigen::Vector2d& at, double radius_m) {
-  Eigen::Matrix3d move = Eigen::Matrix3d::Identity();
-  move.topRightCorner<2, 1>() = at;
-  const Eigen::Vector3d circle(radius_m * radius_m, radius_m * radius_m, -1);
-  const Eigen::Matrix3d h = image_H_board * move;
-  const Eigen::Matrix3d dual = h * circle.asDiagonal() * h.transpose();
-  return dual.topRightCorner<2, 1>() / dual(2, 2) - apply_homography(image_H_board, at);
+/// Board plane to image: a homography, and what the lens bends as a polynomial of degree 3 (2 with few points).
+class SmoothMap {
+ public:
+  static std::optional<SmoothMap> fit(const std::vector<Eigen::Vector2d>& plane,
+                                      const std::vector<Eigen::Vector2d>& image) {
+    const auto h = fit_homography(plane, image);
+    if (!h) return std::nullopt;
+    SmoothMap map;
+    map.h_ = *h;
+    const auto n = static_cast<Eigen::Index>(plane.size());
+    for (const auto& p : plane) map.middle_ += p / static_cast<double>(n);
+    for (const auto& p : plane) map.reach_ = std::max(map.reach_, (p - map.middle_).norm());
+    constexpr Eigen::Index kPointsForCubic = 20;
+    map.terms_ = n < kPointsForCubic ? 6 : 10;
+    Eigen::MatrixXd terms(n, map.terms_), bent(n, 2);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Eigen::Vector2d& at = plane[static_cast<std::size_t>(i)];
+      terms.row(i) = map.terms_at(at).head(map.terms_).transpose();
+      bent.row(i) = (image[static_cast<std::size_t>(i)] - apply_homography(*h, at)).transpose();
+    }
+    map.bend_ = terms.colPivHouseholderQr().solve(bent);
+    return map;
+  }
+  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector2d& at) const {
+    return apply_homography(h_, at) + bend_.transpose() * terms_at(at).head(terms_);
+  }
+  [[nodiscard]] Eigen::Vector2d straight(const Eigen::Vector2d& at) const { return apply_homography(h_, at); }
+
+ private:
+  [[nodiscard]] Eigen::Matrix<double, 10, 1> terms_at(const Eigen::Vector2d& at) const {
+    const double x = (at.x() - middle_.x()) / reach_, y = (at.y() - middle_.y()) / reach_;
+    Eigen::Matrix<double, 10, 1> t;
+    t << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y;
+    return t;
+  }
+  Eigen::Matrix3d h_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
+  double reach_ = 0;
+  Eigen::Index terms_ = 0;
+  Eigen::MatrixXd bend_;
+};
+
+/// Where the image of a disc has its centre of area, less where the disc's centre is seen: perspective and lens draw it
+/// aside (Heikkila 2000 for perspective alone). By the area of its outline's image.
+Eigen::Vector2d center_shift(const SmoothMap& map, const Eigen::Vector2d& at, double radius_m) {
+  constexpr int kOutline = 48;
+  const Eigen::Vector2d center = map(at);
+  const auto point = [&](int k) {
+    const double angle = 2 * M_PI * k / kOutline;
+    return Eigen::Vector2d(map(at + radius_m * Eigen::Vector2d(std::cos(angle), std::sin(angle))) - center);
+  };
+  double area = 0;
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  Eigen::Vector2d before = point(kOutline - 1);
+  for (int k = 0; k < kOutline; ++k) {
+    const Eigen::Vector2d here = point(k);
+    const double triangle = before.x() * here.y() - before.y() * here.x();
+    area += triangle;
+    moment += triangle * (before + here) / 3;
+    before = here;
+  }
+  return moment / area;
 }
 
 Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
@@ -172,7 +230,7 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
   std::vector<std::size_t> grid;
   std::vector<Disc> discs;
   for (const int window : kWindows_px) {
-    add_discs(smooth, window, discs);
+    if (!add_discs(smooth, window, discs)) break;
     grid = find_grid(discs, board);
     if (!grid.empty()) break;
   }
@@ -194,16 +252,13 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
     set.corners_px.push_back(*center);
     plane.emplace_back(board.corner(static_cast<int>(i)).head<2>());
   }
-  for (int round = 0; round < 2; ++round) {
-    const auto h = fit_homography(plane, set.corners_px);
-    if (!h) return failure(Fault::kBoardNotFound, "the circles do not span a plane");
-    double squared = 0;
-    for (std::size_t i = 0; i < plane.size(); ++i) {
-      if (round == 0) set.corners_px[i] -= center_shift(*h, plane[i], board.mark_size_m / 2);
-      squared += (apply_homography(*h, plane[i]) - set.corners_px[i]).squaredNorm();
-    }
-    set.residual_rms_px = std::sqrt(squared / static_cast<double>(plane.size()));
+  const auto map = SmoothMap::fit(plane, set.corners_px);
+  if (!map) return failure(Fault::kBoardNotFound, "the circles do not span a plane");
+  for (std::size_t i = 0; i < plane.size(); ++i) {
+    set.corners_px[i] -= center_shift(*map, plane[i], board.mark_size_m / 2);
+    set.residual_rms_px += (map->straight(plane[i]) - set.corners_px[i]).squaredNorm();
   }
+  set.residual_rms_px = std::sqrt(set.residual_rms_px / static_cast<double>(plane.size()));
   return set;
 }
 

@@ -165,7 +165,10 @@ std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSee
 std::vector<LatticeMatch> match_lattice(std::span<const LatticePoint> grown, std::span<const LatticePlace> places,
                                         int quarter_turns, std::size_t missing_max) {
   std::vector<LatticeMatch> matches;
-  if (grown.size() + missing_max < places.size()) return matches;
+  // Too small, or so large that it goes on beyond the edge wherever the places lie in it.
+  if (grown.size() + missing_max < places.size() || grown.size() > places.size() + (places.size() + 3) / 4) {
+    return matches;
+  }
   std::vector<LatticePlace> taken;
   std::map<std::pair<int, int>, std::size_t> point_at;
   for (const LatticePoint& p : grown) {

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <span>
 
 namespace firstlook {
 namespace {
@@ -21,8 +22,9 @@ double shortest_side(const Quad& quad) {
   return shortest;
 }
 
-bool is_same(const Quad& a, const Quad& b) {
-  const double near_px = std::max(2.0, 0.1 * shortest_side(a));
+bool is_same(const Quad& a, const Quad& b, double near_px) {
+  // Most are far apart: the middles of the diagonals tell without the turns.
+  if ((a[0] + a[2] - b[0] - b[2]).cwiseAbs().maxCoeff() > 8 * near_px) return false;
   for (std::size_t turn = 0; turn < 4; ++turn) {
     bool same = true;
     for (std::size_t i = 0; i < 4 && same; ++i) same = (a[i] - b[(i + turn) % 4]).norm() < near_px;
@@ -47,23 +49,29 @@ std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_m
   return quad;
 }
 
-void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
-  constexpr double kDarker = 7;                // grey levels below the mean of the window
-  constexpr std::size_t kContoursMax = 20000;  // beyond that it is noise
+/// False for a picture of noise, which it is at every window.
+bool add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
+  constexpr double kDarker = 7;  // grey levels below the mean of the window
   cv::Mat dark;
   cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
   std::vector<std::vector<cv::Point>> contours;
   std::vector<cv::Vec4i> tree;
   cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  if (contours.size() > kContoursMax) return;
+  // White noise has a contour for every 60 pixels, the densest board that can be read (2.5 pixels a cell) for every
+  // 150.
+  constexpr std::size_t kPixelsMin = 100, kAlways = 6000;
+  if (contours.size() > std::max(kAlways, dark.total() / kPixelsMin)) return false;
   for (std::size_t i = 0; i < contours.size(); ++i) {
     constexpr int kParent = 3;
     if (tree[i][kParent] >= 0) continue;  // the inner edge of a dark ring
     const auto quad = quad_of(contours[i], side_min_px);
-    if (quad && std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q); })) {
+    if (!quad) continue;
+    const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
+    if (std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q, near_px); })) {
       quads.push_back(*quad);
     }
   }
+  return true;
 }
 
 std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
@@ -77,7 +85,9 @@ std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
   cv::GaussianBlur(searched, smooth, cv::Size(3, 3), 0);
   searched = smooth;
   std::vector<Quad> quads;
-  for (const int window : kWindows_px) add_quads(searched, window, half ? side_min_px / 2 : side_min_px, quads);
+  for (const int window : kWindows_px) {
+    if (!add_quads(searched, window, half ? side_min_px / 2 : side_min_px, quads)) break;
+  }
   if (!half) return quads;
   for (Quad& quad : quads) {
     for (Eigen::Vector2d& p : quad) p = (p.array() + 0.5) * 2 - 0.5;
@@ -132,18 +142,23 @@ struct CurveFit {
 };
 
 CurveFit fit_curve(const std::vector<EdgePoint>& points, bool bent) {
-  const int n = bent ? 3 : 2;
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  std::array<double, 5> powers{};  // sums of t^k
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const EdgePoint& p : points) {
-    const Eigen::Vector3d row(1, p.t, p.t * p.t);
-    normal += row * row.transpose();
-    right += p.offset * row;
+    const double t2 = p.t * p.t;
+    powers[0] += 1, powers[1] += p.t, powers[2] += t2, powers[3] += t2 * p.t, powers[4] += t2 * t2;
+    right += p.offset * Eigen::Vector3d(1, p.t, t2);
   }
+  Eigen::Matrix3d normal;
+  normal << powers[0], powers[1], powers[2], powers[1], powers[2], powers[3], powers[2], powers[3], powers[4];
   CurveFit fit;
-  const Eigen::MatrixXd inverse = normal.topLeftCorner(n, n).inverse();
-  fit.f.head(n) = inverse * right.head(n);
-  if (bent) fit.bend_sigma = std::sqrt(inverse(2, 2));
+  if (bent) {
+    const Eigen::Matrix3d inverse = normal.inverse();
+    fit.f = inverse * right;
+    fit.bend_sigma = std::sqrt(inverse(2, 2));
+  } else {
+    fit.f.head<2>() = normal.topLeftCorner<2, 2>().inverse() * right.head<2>();
+  }
   for (const EdgePoint& p : points) {
     const double r = p.offset - (fit.f[0] + p.t * (fit.f[1] + p.t * fit.f[2]));
     fit.squared += r * r;
@@ -162,10 +177,10 @@ std::vector<EdgePoint> without_outliers(const std::vector<EdgePoint>& points, co
 }
 
 /// The mean rise of the side's edge, grey levels; empty when there is none.
-std::optional<double> refine_side(GrayImage image, double length_px, double reach_px, Side& side) {
-  constexpr int kPointsMin = 6, kPointsMax = 60, kPointsForBend = 16;
+std::optional<double> refine_side(GrayImage image, double length_px, double reach_px, int points_max, Side& side) {
+  constexpr int kPointsMin = 6, kPointsForBend = 16;
   const double skipped = std::max(1.5, 0.08 * length_px);  // at the ends, where the other side's edge is near
-  const int count = std::clamp(static_cast<int>(length_px - 2 * skipped), kPointsMin, kPointsMax);
+  const int count = std::clamp(static_cast<int>(length_px - 2 * skipped), kPointsMin, points_max);
   std::vector<EdgePoint> points;
   for (int i = 0; i < count; ++i) {
     const double t = skipped + (length_px - 2 * skipped) * (i + 0.5) / count;
@@ -225,12 +240,17 @@ Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px) {
   }
 }
 
-bool refine_quad(GrayImage image, double cell_px, Quad& quad) {
+bool refine_quad(GrayImage image, double cell_px, QuadFit fit, Quad& quad) {
+  struct Round {
+    double widest_px;
+    int points_max;  ///< on a side
+  };
+  // Wide first, since contours are a pixel off; then narrow around what was found, the last time with all points. Only
+  // rises from dark to white count, so the border's inner edge does no harm.
+  constexpr std::array<Round, 3> kRounds = {{{3.0, 16}, {2.0, 16}, {1.5, 60}}};
   std::array<Side, 4> sides;
-  // Wide first, since contours are a pixel off; then narrow around what was found. Only rises from dark to white count,
-  // so the border's inner edge does no harm.
-  for (const double widest_px : {3.0, 2.0, 1.5}) {
-    const double reach_px = std::clamp(0.9 * cell_px, 1.5, widest_px);
+  for (const Round& round : std::span(kRounds).first(fit == QuadFit::kToRead ? 1 : kRounds.size())) {
+    const double reach_px = std::clamp(0.9 * cell_px, 1.5, round.widest_px);
     double lowest = std::numeric_limits<double>::infinity(), highest = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       const Eigen::Vector2d a = quad[i], b = quad[(i + 1) % 4];
@@ -239,7 +259,7 @@ bool refine_quad(GrayImage image, double cell_px, Quad& quad) {
       const Eigen::Vector2d along = (b - a) / length;
       // Clockwise with y down: outside is on the left of the way.
       sides[i] = {a, along, {along.y(), -along.x()}};
-      const auto rise = refine_side(image, length, reach_px, sides[i]);
+      const auto rise = refine_side(image, length, reach_px, round.points_max, sides[i]);
       if (!rise) return false;
       lowest = std::min(lowest, *rise), highest = std::max(highest, *rise);
     }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "platform/core/image_view.hpp"
@@ -19,10 +20,14 @@ using Quad = std::array<Eigen::Vector2d, 4>;
 /// @return kOutOfMemory
 [[nodiscard]] Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px = 10);
 
+/// How well a quadrangle must be known: well enough that its cells can be read (a fifth of a pixel; a fifth of the
+/// time), or as well as the image tells.
+enum class QuadFit : std::uint8_t { kToRead, kToMeasure };
+
 /// Moves each side onto the edge between dark and white (subpixel edge points, a line through them, or a parabola where
 /// lens distortion bends it) and the corners to where the sides meet. `cell_px` is how far from it no other edge from
 /// dark to white (seen from inside) lies: the width of a marker's border. False when a side has no edge.
-[[nodiscard]] bool refine_quad(GrayImage image, double cell_px, Quad& quad);
+[[nodiscard]] bool refine_quad(GrayImage image, double cell_px, QuadFit fit, Quad& quad);
 
 /// Grey value between pixel centres, bilinear; the border's beyond the image.
 [[nodiscard]] double gray_between(GrayImage image, const Eigen::Vector2d& px);

@@ -170,7 +170,8 @@ std::optional<Reading> read_picture(const BoardSpec& board, const CellGrays& cel
 std::optional<SquareMarker> recognise(GrayImage image, const BoardSpec& board, const CodeBook& book, Quad quad) {
   const int cells = marker_cells(board);
   const double border_cells = board.type == TargetType::kPatternMarker ? (cells - kPatternCells) / 2.0 : 1;
-  if (!refine_quad(image, border_cells * side_px(quad) / cells, quad)) return std::nullopt;
+  const double border_px = border_cells * side_px(quad) / cells;
+  if (!refine_quad(image, border_px, QuadFit::kToRead, quad)) return std::nullopt;
   const auto grays = read_cells(image, quad, cells);
   if (!grays) return std::nullopt;
   std::optional<Reading> reading;
@@ -180,6 +181,10 @@ std::optional<SquareMarker> recognise(GrayImage image, const BoardSpec& board, c
     reading = book.read(*code);
   }
   if (!reading) return std::nullopt;
+  // A ChArUco board's markers only say where its squares are.
+  if (board.type != TargetType::kCharuco && !refine_quad(image, border_px, QuadFit::kToMeasure, quad)) {
+    return std::nullopt;
+  }
   SquareMarker found{reading->marker, {}, reading->wrong_cells};
   for (std::size_t i = 0; i < 4; ++i) found.corners_px[i] = quad[(i + reading->turns) % 4];
   return found;
@@ -313,7 +318,8 @@ Result<CornerSet> charuco_corners(GrayImage image, const BoardSpec& board, const
       if (!square) continue;
       const Quad start = *square;
       const double side = side_px(start);
-      if (!refine_quad(image, side * (1 - board.mark_size_m / board.square_size_m) / 2, *square)) continue;
+      if (!refine_quad(image, side * (1 - board.mark_size_m / board.square_size_m) / 2, QuadFit::kToMeasure, *square))
+        continue;
       for (std::size_t k = 0; k < 4; ++k) {
         const int c = column + (k == 1 || k == 2 ? 1 : 0), r = row + (k >= 2 ? 1 : 0);
         if (c < 0 || r < 0 || c >= board.inner_columns || r >= board.inner_rows) continue;

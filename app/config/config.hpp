@@ -109,7 +109,7 @@ struct Config {
   } map;
 
   struct Explore {
-    int views_max = 60;
+    int views_max = 150;
     int candidates = 400;
     int certificate_samples = 2000;
     int cluster_voxels_min = 8;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "algorithms/calibration/board_flips.hpp"
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/intrinsics.hpp"
 #include "algorithms/vision/board_pose.hpp"
 #include "algorithms/vision/target_detection.hpp"
@@ -267,21 +267,24 @@ Status calibrate_camera(CalibrationDataset& data) {
 
 /// Found corners of a board that looks the same upside down may begin at either end: the arm's motion tells.
 void settle_flips(CalibrationDataset& data) {
-  std::vector<PosePair> pairs;
+  std::vector<OpenView> open;
   for (const CalibrationView& view : data.views) {
     const auto pose = estimate_board_pose(data.camera, data.board, view.corners_px);
     if (!pose) return;
-    pairs.push_back({view.base_T_flange, pose->camera_T_board});
+    open.push_back(open_view(data.board, view, *pose));
   }
-  const std::vector<bool> flips = settle_board_flips(data.board, pairs);
-  for (std::size_t i = 0; i < flips.size(); ++i) {
-    if (flips[i]) std::reverse(data.views[i].corners_px.begin(), data.views[i].corners_px.end());
+  const auto choices = settle_choices(open);
+  int turned = 0;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    if (!open[i].choices[choices[i]].reversed) continue;
+    std::reverse(data.views[i].corners_px.begin(), data.views[i].corners_px.end());
+    ++turned;
   }
   data.notes.push_back(fmt::format(
       "a {}x{} board looks the same upside down: {} of {} views turned so that they agree with the arm's motion; a "
       "board "
       "of odd x even corners needs no guess",
-      data.board.inner_columns, data.board.inner_rows, std::count(flips.begin(), flips.end(), true), flips.size()));
+      data.board.inner_columns, data.board.inner_rows, turned, choices.size()));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/camera_on_arm.hpp"
 #include "algorithms/view_planning/identify.hpp"
 #include "algorithms/view_planning/locate.hpp"
@@ -71,6 +72,20 @@ void Workbench::keep_picture(std::size_t observation) {
   std::copy(from.begin(), from.end(), pictures_.items().begin() + static_cast<std::ptrdiff_t>(observation * pixels));
 }
 
+/// Which of the poses that each picture allows was true: the views taken so far tell it of each other.
+void Workbench::settle_observations(BoardLook purpose) {
+  std::vector<OpenView> open;
+  for (const Observation& o : observations_) open.push_back(open_view(board_, o.view, o.pose));
+  const bool verifies = purpose == BoardLook::kVerify && facts_.stored;
+  const auto choices = verifies ? settle_choices(open, facts_.stored->flange_T_camera) : settle_choices(open);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const PoseChoice& choice = open[i].choices[choices[i]];
+    Observation& o = observations_[i];
+    adopt_choice(board_, choice, o.pose);
+    if (choice.reversed) std::reverse(o.view.corners_px.begin(), o.view.corners_px.end());
+  }
+}
+
 DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   DetectResult result;
   if (arguments.purpose == BoardLook::kVerify) ++verification_looks_;
@@ -101,6 +116,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     o.residual_rms_px = pose->residual_rms_px;
     keep_picture(observations_.size());
     observations_.push_back(std::move(o));
+    settle_observations(arguments.purpose);
   }
   return result;
 }

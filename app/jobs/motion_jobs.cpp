@@ -32,6 +32,7 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
   PlannerOptions options;
   options.seed = mix64(static_cast<std::uint64_t>(config_.seed)) + arguments.step;
   options.limits = limits_;
+  if (mapping) options.trail = trail_;
   const auto plan_at = [&](const FreeSpace& space, const Pace& pace) {
     const Body& body = body_of(arguments.phase);
     options.limits = pace.limits;
@@ -44,6 +45,7 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
     result.path = route_of(*path, body, pace.limits);
     result.margin_m = path->margin_m;
     clearance_in_force_ = pace.in_force;
+    if (mapping) note_trail(*path);
   };
   if (!mapping) {
     const Clearance blind = blind_terms_.clearance();
@@ -67,9 +69,19 @@ PlanResult Workbench::certify_path(const PlanArguments& arguments) {
   return result;
 }
 
+/// The waypoints of paths that the arm was sent along, the latest last; whoever uses them certifies them again.
+void Workbench::note_trail(const Path& path) {
+  if (trail_.size() + path.waypoints.size() > trail_.capacity()) {
+    const auto middle = trail_.begin() + static_cast<std::ptrdiff_t>(trail_.size() / 2);
+    trail_.resize(static_cast<std::size_t>(std::copy(middle, trail_.end(), trail_.begin()) - trail_.begin()));
+  }
+  for (const JointVector& q : path.waypoints) trail_.push_back(q);
+}
+
 void Workbench::take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace) {
   result.found = true;
   result.path = route_of(path, camera_body_, pace.limits);
+  note_trail(path);
   result.gain_expected = gain;
   expected_gain_ = gain;
   clearance_in_force_ = pace.in_force;
@@ -118,6 +130,7 @@ NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
   options.gain_min = static_cast<std::uint32_t>(config_.explore.cluster_voxels_min);
   options.certificate_samples = config_.explore.certificate_samples;
   options.timing.limits = pace.limits;
+  options.trail = trail_;
   options.timing.settle_s = config_.calibration.settle_time_s;
   const ViewContext view_context = context(pace.plan);
   const auto choice = chooser_.choose(view_context, here.at_rad, options, [this](int n, IndexedBody body) {

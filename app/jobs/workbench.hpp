@@ -118,6 +118,7 @@ class Workbench {
   };
   [[nodiscard]] std::array<Pace, 3> mapping_paces() const;
   void revoke_zone();
+  void note_trail(const Path& path);
   [[nodiscard]] Route route_of(const Path& path, const Body& body, const SpeedLimits& limits) const;
   [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
   [[nodiscard]] ViewContext context(const Clearance& clearance) const;
@@ -127,6 +128,7 @@ class Workbench {
   [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
   [[nodiscard]] Result<CornerSet> averaged_corners(const DetectArguments& arguments);
   void keep_picture(std::size_t observation);
+  void settle_observations(BoardLook purpose);
   [[nodiscard]] std::optional<ViewDesignModel> rough_model() const;
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
   [[nodiscard]] ArmSigma arm_sigma_expected() const;
@@ -187,6 +189,7 @@ class Workbench {
   bool any_revoked_ = false;
   FreeSpace mapping_space_;  ///< as rebuilt last
   ViewChooser chooser_;
+  FixedVector<JointVector, 512> trail_;
   std::optional<SweepProgress> sweep_;
   std::vector<std::int8_t> swept_log_odds_;  ///< when the sweep ended
   PublishedSpace published_;

@@ -26,6 +26,8 @@ struct MachineSettings {
   int calibration_views_max = 30;
   int verify_views = 3;  ///< views of the board that a stored calibration is tested on at least
   int explore_views_max = 60;
+  double mapping_time_max_s =
+      480;  ///< from the first look on: what was seen first must not be too old for the way back
   double frames_while_moving_hz = 2;
   double path_deviation_max_m = 0.02;
   std::array<double, kJointsMax> lever_arm_m{1.15, 1.15, 0.72, 0.32, 0.24, 0.14, 0.14};  ///< bound of FACTS for a UR5
@@ -42,6 +44,7 @@ struct Progress {
   std::uint32_t steps = 0;         ///< of the current state: seeds its candidates
   std::uint32_t sweep_views = 0;
   std::uint32_t explore_views = 0;
+  std::optional<Instant> mapping_started;
   std::uint32_t replans = 0;        ///< in a row, without a view between
   std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
   bool calibration_accepted = false;

@@ -22,6 +22,9 @@ std::optional<RunScope> find_scope(std::string_view name) {
   return std::nullopt;
 }
 
+// Of the age at which known free space expires; the rest is for the way back, with the look at the board.
+constexpr double kMappingShareOfAge = 0.8;
+
 MachineSettings machine_settings(const Config& config, RunScope scope) {
   MachineSettings s;
   s.scope = scope;
@@ -32,6 +35,7 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.calibration_views_max = config.calibration.views_max;
   s.verify_views = config.calibration.verify_views;
   s.explore_views_max = config.explore.views_max;
+  s.mapping_time_max_s = kMappingShareOfAge * config.map.free_max_age_s;
   s.frames_while_moving_hz = config.explore.frames_while_moving_hz;
   if (config.parking_rad) s.parking_rad = *config.parking_rad;
   return s;

@@ -36,12 +36,12 @@ solids:
   - {name: machine front right, box: {size_m: [0.04, 0.02, 0.30]}, position_m: [1.13, 0.11, 0.13], color: [0.66, 0.62, 0.48]}
 
   # Movable screens: two panels on feet, folded.
-  - {name: screen, box: {size_m: [0.90, 0.03, 1.20]}, position_m: [-0.10, -0.74, -0.23], color: [0.25, 0.40, 0.55]}
-  - {name: screen, box: {size_m: [0.70, 0.03, 1.20]}, position_m: [-0.80, -0.52, -0.23], rpy_deg: [0, 0, -40], color: [0.25, 0.40, 0.55]}
+  - {name: screen, box: {size_m: [0.90, 0.03, 1.30]}, position_m: [-0.10, -0.74, -0.18], color: [0.25, 0.40, 0.55]}
+  - {name: screen, box: {size_m: [0.70, 0.03, 1.30]}, position_m: [-0.80, -0.52, -0.18], rpy_deg: [0, 0, -40], color: [0.25, 0.40, 0.55]}
   - {name: screen foot, box: {size_m: [0.05, 0.40, 0.03]}, position_m: [0.20, -0.74, -0.835]}
 
   # A crate behind the arm.
-  - {name: crate, box: {size_m: [0.24, 0.60, 1.10]}, position_m: [-0.74, 0.20, -0.30], color: [0.62, 0.50, 0.34]}
+  - {name: crate, box: {size_m: [0.24, 0.60, 1.25]}, position_m: [-0.74, 0.20, -0.225], color: [0.62, 0.50, 0.34]}
 
   - {name: shelf, box: {size_m: [0.35, 1.20, 1.70]}, position_m: [-1.90, 0.90, 0.0], color: [0.50, 0.50, 0.54]}
   - {name: column, cylinder: {radius_m: 0.12, height_m: 2.6}, position_m: [-1.10, 1.55, 0.45], color: [0.6, 0.6, 0.58]}

@@ -7,11 +7,20 @@ constexpr std::uint32_t kReplansMax = 8;  // in a row, without a view between
 
 /// As in views.csv, where the sweep's come first.
 std::uint32_t next_number(const Progress& p) { return p.sweep_views + p.explore_views + 1; }
+
+bool views_are_up(const Machine& m, const Progress& p) {
+  return p.explore_views >= static_cast<std::uint32_t>(m.settings().explore_views_max);
+}
+
+/// What was seen first grows too old to move in (safety rule 1): time to go back.
+bool time_is_up(const Machine& m, const Progress& p) {
+  return p.mapping_started && (m.now() - *p.mapping_started).seconds() > m.settings().mapping_time_max_s;
+}
 }  // namespace
 
 void enter_choose(Machine& m) {
   Progress& p = m.progress();
-  if (p.explore_views >= static_cast<std::uint32_t>(m.settings().explore_views_max) || p.replans > kReplansMax) {
+  if (views_are_up(m, p) || time_is_up(m, p) || p.replans > kReplansMax) {
     m.transition(StateId::kVerifyBoard);
     return;
   }

@@ -34,6 +34,7 @@ void take(Machine& m, const NextViewResult& choice) {
 /// Before the first look the arm goes back to where it started, still by the rules of the safe zone: where the last
 /// view of the board left it, the camera that is now known may be too near to the arm itself.
 void enter_sweep(Machine& m) {
+  if (!m.progress().mapping_started) m.progress().mapping_started = m.now();
   if (m.progress().sweep_views == 0) {
     m.show("sweep view 1: from where the job began");
     plan_to(m, m.settings().parking_rad, MotionPhase::kBeforeCalibration);

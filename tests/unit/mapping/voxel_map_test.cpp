@@ -19,6 +19,7 @@ struct SmallMap {
   VoxelMap map{GridGeometry{0.05, {0, 0, 0}, {4, 4, 4}}};
   FrameChange see(bool hit, std::size_t index, const Transform<Base, Depth>& pose, double stamp_s) {
     std::vector<std::uint64_t> none(1, 0), bits(1, 1ULL << index);
+    if (!hit) map.note_crossed(index, 0xFF);
     return hit ? map.apply(none, bits, pose, stamp_s) : map.apply(bits, none, pose, stamp_s);
   }
   FrameChange miss(std::size_t index, const Transform<Base, Depth>& pose, double stamp_s) {
@@ -189,6 +190,12 @@ TEST_CASE("the safe zone holds whole voxels, and hits revoke them one by one", "
   map.free_mask(2, kMaxAge_s, mask);
   CHECK(mask[target] == 0);  // one miss does not give it back
   for (int i = 0; i < 5; ++i) map.apply(hit, none, pose_at(0.1 * i), 3);
+  map.free_mask(3, kMaxAge_s, mask);
+  CHECK(mask[target] == 0);  // nobody has looked through all of it
+  map.note_crossed(target, 0xFE);
+  map.free_mask(3, kMaxAge_s, mask);
+  CHECK(mask[target] == 0);
+  map.note_crossed(target, 0x01);
   map.free_mask(3, kMaxAge_s, mask);
   CHECK(mask[target] == 1);  // known free by rule 1
   CHECK_FALSE(map.in_intact_safe_zone(target));

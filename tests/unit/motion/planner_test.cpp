@@ -183,3 +183,35 @@ TEST_CASE("the default start: margin in the safe zone with the envelope, and a w
                                default_start(arm)) >= 0.01);
   }
 }
+
+TEST_CASE("the way back along the way out is found without a sample") {
+  const ArmModel arm = *find_arm_model("ur5");
+  const Body body = bare_body(arm);
+  Planner planner;
+  Random random(3);
+  int back = 0, lost = 0;
+  for (int i = 0; i < 40; ++i) {
+    const RandomCell cell(static_cast<std::uint64_t>(300 + i / 8), 6);
+    FreeSpace space;
+    space.field = &cell.field;
+    const JointVector start = free_joints(random, arm, body, space);
+    const JointVector goal = free_joints(random, arm, body, space);
+    const auto out = planner.plan(arm, body, space, kNeed, start, goal);
+    if (!out || out->waypoints.size() < 4) continue;
+    PlannerOptions options{.seed = 9, .iterations_max = 0};
+    lost += planner.plan(arm, body, space, kNeed, goal, start, options) ? 0 : 1;
+    const std::vector<JointVector> trail(out->waypoints.begin(), out->waypoints.end());
+    options.trail = trail;
+    const auto home = planner.plan(arm, body, space, kNeed, goal, start, options);
+    REQUIRE(home);
+    ++back;
+    for (std::size_t w = 1; w < home->waypoints.size(); ++w) {
+      for (int k = 0; k <= 12; ++k) {
+        const JointVector q = interpolate(home->waypoints[w - 1], home->waypoints[w], k / 12.0);
+        REQUIRE(sampled_margin_m(arm, body, cell, space, kNeed, q, 0.03) >= 0);
+      }
+    }
+  }
+  CHECK(back >= 5);
+  CHECK(lost >= 5);
+}

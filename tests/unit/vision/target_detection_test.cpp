@@ -147,6 +147,52 @@ TEST_CASE("one target is not taken for another, nor a picture of nothing", "[vis
   CHECK_FALSE(detect_target(image.view(), others));
 }
 
+TEST_CASE("a bending lens does not make circle grids larger", "[vision][target]") {
+  constexpr CameraIntrinsics bending{640, 480, 534.78, 534.10, 308.63, 226.92, -.25, .1, 0, 0, 0};
+  for (const Case& c : {kCases[0], kCases[1]}) {
+    double outward_px = 0;
+    constexpr int kViews = 6;
+    for (int view = 0; view < kViews; ++view) {
+      const Pose pose = look_at_board(c.board, 0.45, 0.1 * view, view, view);
+      DrawOptions options;
+      options.blur_px = 0.6;
+      const auto found = detect_target(draw_board(bending, c.board, pose, options).view(), c.board);
+      REQUIRE(found);
+      const Eigen::Vector2d middle = *project(bending, pose * c.board.center());
+      for (int i = 0; i < c.board.corners(); ++i) {
+        const Eigen::Vector2d truth = *project(bending, pose * c.board.corner(i)), out = truth - middle;
+        if (out.norm() < 20) continue;
+        // Upside down is as good: the nearest point counts.
+        const auto& points = found->corners_px;
+        const auto nearest = std::min_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
+          return (a - truth).squaredNorm() < (b - truth).squaredNorm();
+        });
+        outward_px += (*nearest - truth).dot(out.normalized()) / (kViews * c.board.corners());
+      }
+    }
+    CAPTURE(c.name);
+    CHECK(std::abs(outward_px) < 0.002);  // 0.03 without the lens in the discs' bias
+  }
+}
+
+TEST_CASE("ChArUco corners have no bias", "[vision][target]") {
+  for (const Case& c : {kCases[2], kCases[3]}) {
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    constexpr int kViews = 10;
+    for (int view = 0; view < kViews; ++view) {
+      const Pose pose = look_at_board(c.board, 0.45 + 0.02 * view, 0.06 * view, view, 0.7 * view);
+      DrawOptions options;
+      options.blur_px = 0.6;
+      options.seed = static_cast<std::uint64_t>(view) + 1;
+      const auto found = detect_target(draw_board(kCamera, c.board, pose, options).view(), c.board);
+      REQUIRE(found);
+      mean += errors_of(c.board, pose, *found).mean_px / kViews;
+    }
+    CAPTURE(c.name, mean.x(), mean.y());
+    CHECK(mean.norm() < 0.02);  // OpenCV 4.6: 0.5 (tests/oracle)
+  }
+}
+
 TEST_CASE("circle grids that have lost a row are refused", "[vision][target]") {
   const BoardSpec board{9, 6, .03, T::kCircles, .02}, larger{9, 7, .03, T::kCircles, .02};
   const auto image = draw_board(kCamera, larger, look_at_board(larger, 0.5, 0.2, 1, 0.4));
