@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numeric>
 
 #include "algorithms/calibration/board_ambiguity.hpp"
+#include "algorithms/calibration/mistakes/placement_mistakes.hpp"
+#include "algorithms/calibration/unobservable.hpp"
 #include "algorithms/calibration/view_gate.hpp"
 #include "algorithms/vision/board_pose.hpp"
 #include "algorithms/vision/camera_model.hpp"
@@ -119,6 +122,18 @@ void reject_above(const Figure& f, std::vector<std::string>& reasons) {
       fmt::format("{} {:.3g} {}, allowed {:.3g} {}", f.text, f.value * f.to_text, f.unit, f.limit * f.to_text, f.unit));
 }
 
+/// Where one direction is much less sure than the next, it is named: views that turn about another axis would tell it.
+std::string weakest_direction(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
+  constexpr double kMuchLess = 3;  // sigmas
+  if (!(axes.eigenvalues()[2] > kMuchLess * kMuchLess * axes.eigenvalues()[1])) return {};
+  const Eigen::Vector3d d = axes.eigenvectors().col(2);
+  return fmt::format(
+      " (nearly all of it along ({:.2f}, {:.2f}, {:.2f}) of the flange: add views that turn the arm by 20 "
+      "degrees or more about another axis)",
+      d.x() + 0.0, d.y() + 0.0, d.z() + 0.0);
+}
+
 void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, HandEyeResult& result) {
   std::vector<std::string>& reasons = result.reasons;
   reasons.clear();
@@ -155,6 +170,37 @@ void validate(const Validation& validation, const HandEyeOptions& options, HandE
   const int failed = spread_of_subsets(validation, options, result);
   result.usable_distance_m = usable_distance(result.flange_T_camera, result.covariance, options.limits.tolerance_m);
   judge(options.limits, failed, options.subset_solves, result);
+}
+
+/// A degenerate motion with what it leaves open, any other error as it is.
+std::unexpected<Error> name_unobservable(const Error& error, std::span<const PosePair> pairs) {
+  if (error.fault != Fault::kDegenerateMotion) return std::unexpected(error);
+  const std::string text = unobservable_text(unobservable_of(pairs));
+  if (text.empty()) return std::unexpected(error);
+  return failure(Fault::kDegenerateMotion, "{} views: {}", pairs.size(), text);
+}
+
+/// Says what is wrong with the data where that can be told: with the whole of a rejected set, or with single views that
+/// were left out.
+void name_mistake(std::span<const PosePair> pairs, const BoardSpec* board, const std::function<MistakeSearch()>& search,
+                  HandEyeResult& result) {
+  result.likely_mistake.reset();
+  std::vector<bool> kept;
+  for (const ViewFit& fit : result.fits) kept.push_back(fit.used);
+  if (result.verdict == Verdict::kRejected) {
+    MistakeSearch found = search();
+    result.likely_mistake = std::move(found.found);
+    if (!result.likely_mistake && found.tried > 0) result.reasons.push_back(found.sentence());
+  }
+  if (!result.likely_mistake && pairs.size() == kept.size()) {
+    std::string text = mistakes::explain_left_out(pairs, kept, result.flange_T_camera, board);
+    if (!text.empty()) {
+      result.likely_mistake = LikelyMistake{Mistake::kSingleViews, "likely mistake: " + std::move(text), {}, {}};
+    }
+  }
+  if (result.likely_mistake && result.verdict == Verdict::kRejected) {
+    result.reasons.push_back(result.likely_mistake->text);
+  }
 }
 
 HandEyeResult start_result(const Refinement& refinement, std::span<const PosePair> used_pairs) {
@@ -224,8 +270,11 @@ std::vector<std::string> covariance_reasons(const VerdictLimits& limits, const H
   reject_above(
       {result.sigma_translation_m.maxCoeff(), limits.sigma_translation_max_m, 1e3, "sigma of translation", "mm"},
       reasons);
+  if (!reasons.empty()) reasons.back() += weakest_direction(result.covariance.topLeftCorner<3, 3>());
+  const std::size_t before = reasons.size();
   reject_above({result.sigma_rotation_rad.maxCoeff(), limits.sigma_rotation_max_rad, 1e3, "sigma of rotation", "mrad"},
                reasons);
+  if (reasons.size() > before) reasons.back() += weakest_direction(result.covariance.bottomRightCorner<3, 3>());
   reject_above({3 * point_sigma(result.flange_T_camera, result.covariance, limits.mapping_distance_m),
                 limits.voxel_size_m / 2, 1e3, "3 sigma at the mapping distance", "mm"},
                reasons);
@@ -250,9 +299,9 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Board
                                      std::span<const CalibrationView> views, const HandEyeOptions& options) {
   const UsedViews seen = select_views(camera, board, views, {});
   const auto start = solve_pose_pairs_robust(seen.pairs, options.solver, options.refinement.view_gate);
-  if (!start) return std::unexpected(start.error());
+  if (!start) return name_unobservable(start.error(), seen.pairs);
   const auto refinement = refine_hand_eye(camera, board, views, start->flange_T_camera, options.refinement);
-  if (!refinement) return std::unexpected(refinement.error());
+  if (!refinement) return name_unobservable(refinement.error(), seen.pairs);
   HandEyeResult result = start_result(
       *refinement, select_views(camera, board, views, refinement->views, refinement->flange_T_camera).pairs);
   result.closed_form = start->flange_T_camera;
@@ -281,6 +330,8 @@ void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, s
     return squared_error_px(camera, board, used.views[i], r.flange_T_camera, r.base_T_board);
   };
   validate(validation, options, result);
+  const std::vector<PosePair> all = select_views(camera, board, views, {}, result.flange_T_camera).pairs;
+  name_mistake(all, &board, [&] { return find_likely_mistake(camera, board, views); }, result);
 }
 
 Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
@@ -292,9 +343,9 @@ Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const B
 
 Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pairs, const HandEyeOptions& options) {
   const auto start = solve_pose_pairs_robust(pairs, options.solver, options.refinement.view_gate);
-  if (!start) return std::unexpected(start.error());
+  if (!start) return name_unobservable(start.error(), pairs);
   const auto refinement = refine_from_pairs(pairs, start->flange_T_camera, options.refinement);
-  if (!refinement) return std::unexpected(refinement.error());
+  if (!refinement) return name_unobservable(refinement.error(), pairs);
   Validation validation;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (refinement->views[i].used) validation.pairs.push_back(pairs[i]);
@@ -310,6 +361,7 @@ Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pa
     return refine_from_pairs(some, result.flange_T_camera, quick);
   };
   validate(validation, options, result);
+  name_mistake(pairs, nullptr, [&] { return find_likely_mistake(pairs); }, result);
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include "algorithms/calibration/calibration_view.hpp"
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
 #include "algorithms/calibration/hand_eye_refinement.hpp"
+#include "algorithms/calibration/likely_mistake.hpp"
 
 namespace firstlook {
 
@@ -67,6 +68,9 @@ struct HandEyeResult {
   std::vector<std::optional<double>> holdout_px;
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons;  ///< why rejected; empty when accepted
+  /// What people most likely did wrong; also the last of the reasons when rejected. Of an accepted calibration: what is
+  /// wrong with the views that were left out. Empty when nothing was found.
+  std::optional<LikelyMistake> likely_mistake;
 };
 
 /// Closed form, refinement, hold-out, subsets, usable distance, verdict. Deterministic. About 1 s for 25 views of 54

@@ -21,10 +21,7 @@ double median(std::vector<double> values) {
 /// Sizes of the misfits as one number each, in median (or floor) misfits.
 struct Misfits {
   std::vector<double> ratio;
-  double median_translation_m = 0;
-  double median_rotation_rad = 0;
-  /// 0.5 m: a rotation of the flange moves the board in view by about that much for each radian.
-  [[nodiscard]] double size_m() const { return median_translation_m + 0.5 * median_rotation_rad; }
+  Misfit median;
 };
 
 Misfits measure(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera) {
@@ -35,11 +32,11 @@ Misfits measure(std::span<const PosePair> pairs, const Transform<Flange, Camera>
     rotation.push_back(m.tail<3>().norm());
   }
   Misfits result;
-  result.median_translation_m = median(translation);
-  result.median_rotation_rad = median(rotation);
+  result.median.translation_m = median(translation);
+  result.median.rotation_rad = median(rotation);
   for (std::size_t i = 0; i < misfits.size(); ++i) {
-    result.ratio.push_back(std::max(translation[i] / std::max(kTranslationFloor_m, result.median_translation_m),
-                                    rotation[i] / std::max(kRotationFloor_rad, result.median_rotation_rad)));
+    result.ratio.push_back(std::max(translation[i] / std::max(kTranslationFloor_m, result.median.translation_m),
+                                    rotation[i] / std::max(kRotationFloor_rad, result.median.rotation_rad)));
   }
   return result;
 }
@@ -73,6 +70,10 @@ std::vector<Vector6d> flange_misfits(std::span<const PosePair> pairs, const Tran
     misfits.push_back(pose_difference(seen.pose(), pair.base_T_flange.pose()));
   }
   return misfits;
+}
+
+Misfit median_misfit(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera) {
+  return measure(pairs, flange_T_camera).median;
 }
 
 Transform<Base, Board> median_board_pose(std::span<const PosePair> pairs,
@@ -121,12 +122,12 @@ Result<HandEyeSolution> solve_pose_pairs_robust(std::span<const PosePair> pairs,
 
   Random random(1, 2101);
   auto best = plain->flange_T_camera;
-  double best_size_m = all.size_m();
+  double best_size_m = all.median.size_m();
   for (int trial = 0; trial < kTrials; ++trial) {
     // By any solver that takes every four: it only tells the good views.
     const auto four = solve_closed_form(random_four(pairs, random), Solver::kParkMartin);
     if (!four) continue;
-    const double size_m = measure(pairs, *four).size_m();
+    const double size_m = measure(pairs, *four).median.size_m();
     if (size_m < best_size_m) {
       best_size_m = size_m;
       best = *four;

@@ -7,6 +7,7 @@
 
 #include "algorithms/calibration/calibration_view.hpp"
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
+#include "algorithms/calibration/mistakes/mistake_trial.hpp"
 #include "platform/core/result.hpp"
 
 namespace firstlook {
@@ -15,6 +16,9 @@ namespace firstlook {
 [[nodiscard]] std::vector<Vector6d> flange_misfits(std::span<const PosePair> pairs,
                                                    const Transform<Flange, Camera>& flange_T_camera,
                                                    const Transform<Base, Board>& base_T_board);
+
+/// Median over the views of the lengths of flange_misfits against median_board_pose.
+[[nodiscard]] Misfit median_misfit(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera);
 
 /// The board's pose that most views agree on: component-wise median of position, chordal mean of the rotations near it.
 [[nodiscard]] Transform<Base, Board> median_board_pose(std::span<const PosePair> pairs,

@@ -78,6 +78,18 @@ void print_text(const HandEyeResult& r) {
   fmt::print("usable distance  {:.2f} m\n", r.usable_distance_m);
   fmt::print("verdict          {}\n", r.verdict == Verdict::kAccepted ? "accepted" : "rejected");
   for (const std::string& reason : r.reasons) fmt::print("  {}\n", reason);
+  // Of a rejected one it stands among the reasons.
+  if (r.likely_mistake && r.verdict == Verdict::kAccepted) fmt::print("left out         {}\n", r.likely_mistake->text);
+}
+
+/// Data that cannot be solved at all: why, and what was likely done wrong.
+int fail_to_solve(const CalibrationDataset& data, const Error& error) {
+  fail(error, kDataError);
+  const MistakeSearch search = data.source == CalibrationSource::kPairs
+                                   ? find_likely_mistake(data.pairs)
+                                   : find_likely_mistake(data.camera, data.board, data.views);
+  if (const std::string sentence = search.sentence(); !sentence.empty()) fmt::print(stderr, "{}\n", sentence);
+  return kDataError;
 }
 
 Status write_files(const CalibrateCommandOptions& options, const CalibrationDataset& data, const HandEyeResult& result,
@@ -131,7 +143,7 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
   const auto result = data->source == CalibrationSource::kPairs
                           ? calibrate_hand_eye_from_pairs(data->pairs, hand_eye)
                           : calibrate_hand_eye(data->camera, data->board, data->views, hand_eye);
-  if (!result) return fail(result.error(), kDataError);
+  if (!result) return fail_to_solve(*data, result.error());
   narrate_views(*data, *result);
   if (!options.out.empty()) {
     if (const Status s = write_files(options, *data, *result, hand_eye); !s) return fail(s.error(), kDataError);

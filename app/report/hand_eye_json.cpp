@@ -42,6 +42,19 @@ json only_validated(const HandEyeResult& result, json value) {
   return result.holdout_rms_m > 0 ? std::move(value) : json(nullptr);
 }
 
+json misfit_json(const std::optional<Misfit>& misfit) {
+  if (!misfit) return nullptr;
+  return {{"translation_mm", misfit->translation_m * 1e3}, {"rotation_mrad", misfit->rotation_rad * 1e3}};
+}
+
+json mistake_json(const std::optional<LikelyMistake>& mistake) {
+  if (!mistake) return nullptr;
+  return {{"mistake", mistake_name(mistake->mistake)},
+          {"text", mistake->text},
+          {"misfit_as_given", misfit_json(mistake->before)},
+          {"misfit_without_it", misfit_json(mistake->after)}};
+}
+
 json rows_or_null(const std::optional<Matrix3x4d>& matrix) {
   if (!matrix) return nullptr;
   json rows = json::array();
@@ -70,6 +83,7 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
       result.usable_distance_m > 0 ? json(result.usable_distance_m) : only_validated(result, 0.0);
   object["verdict"] = result.verdict == Verdict::kAccepted ? "accepted" : "rejected";
   object["reasons"] = result.reasons;
+  object["likely_mistake"] = mistake_json(result.likely_mistake);
   object["solver"] = solver;
   object["closed_form"] = transform_json(result.closed_form.pose());
   object["closed_form_matrix"] = rows_or_null(result.closed_form_raw);
