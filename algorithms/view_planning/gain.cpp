@@ -14,17 +14,11 @@ constexpr std::uint8_t kUnknownWeight = 4;
 constexpr std::uint8_t kAgainWeight = 1;
 constexpr std::uint8_t kPass = 0;
 
-/// A voxel with a surface in it that rays have passed beside is free in the map; it still ends most rays.
-VoxelClass class_for_looking(const VoxelMap& map, std::size_t index) {
-  const VoxelClass voxel = map.voxel_class(index);
-  return voxel == VoxelClass::kFree && map.holds_surface(index) ? VoxelClass::kOccupied : voxel;
-}
-
-/// Free in the map, but motion cannot use it: seen from one pose only, in part, doubted by the latest frame, or so long
-/// ago that it soon cannot.
+/// Free in the map, but motion cannot use it: seen from one pose only, in part (but not beside a surface), doubted by
+/// the latest frame, or so long ago that it soon cannot.
 bool needs_again(const ViewContext& context, std::size_t index) {
-  if (context.space.field == nullptr || class_for_looking(context.map, index) != VoxelClass::kFree) return false;
-  if (context.map.blocked(index)) return false;
+  if (context.space.field == nullptr || context.map.voxel_class(index) != VoxelClass::kFree) return false;
+  if (context.map.blocked(index) || context.map.holds_surface(index)) return false;
   return context.space.field->values()[index] <= 0 ||
          context.map.expires(index, context.fresh_until_s, context.free_max_age_s);
 }
@@ -73,7 +67,7 @@ void GainModel::prepare(const ViewContext& context) {
   for (std::size_t i = 0; i < plane_.size(); ++i) {
     const bool counts = context.zone[i] != 0;
     const bool futile = futile_.count(i) >= sampling_.futile_max;
-    switch (class_for_looking(context.map, i)) {
+    switch (context.map.voxel_class(i)) {
       case VoxelClass::kOccupied:
         plane_[i] = kOpaque;
         break;
@@ -142,7 +136,7 @@ std::size_t GainModel::remember_look(const ViewContext& context, const JointVect
   worker.scratch.begin();
   for (const Eigen::Vector3d& end : rays.ends_m) {
     walk_ray(geometry_, base_T_depth.translation(), base_T_depth * end, [&](std::size_t i, double entry) {
-      const VoxelClass voxel = class_for_looking(context.map, i);
+      const VoxelClass voxel = context.map.voxel_class(i);
       const bool in_range = entry * end.z() >= sensor_.range_min_m;
       const bool unknown = voxel == VoxelClass::kUnknown;
       if (in_range && context.zone[i] != 0 && (unknown || needs_again(context, i)) && worker.scratch.mark(i)) {

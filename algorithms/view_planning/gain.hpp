@@ -14,7 +14,7 @@ namespace firstlook {
 struct GainSampling {
   int columns = 44;  ///< 1.3 degrees for a Kinect: a 5 cm voxel is met out to 2.2 m, and the reach zone ends before
   int rows = 33;
-  int futile_max = 8;  ///< looks without result after which a voxel is taken to be solid or to give no return
+  int futile_max = 3;  ///< looks without result after which a voxel is taken to be solid or to give no return
 };
 
 /// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark
