@@ -110,19 +110,46 @@ ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Ma
   return next;
 }
 
+namespace {
+
+/// Expectation maximisation creeps where its steps shrink by the same factor each time, and all the more towards a
+/// sigma of zero: the sum of the steps to come is taken at once (Aitken 1926), bounded.
+class Accelerated {
+ public:
+  /// log sigma after the step that expectation maximisation makes.
+  double next(double log_sigma, double log_step) {
+    constexpr double kFactorMax = 30;
+    const double shrinking = last_step_ == 0 ? 0 : log_step / last_step_;
+    const bool steady = shrinking > 0 && shrinking < 1 && !extrapolated_;
+    const double factor = steady ? std::min(kFactorMax, 1 / (1 - shrinking)) : 1;
+    extrapolated_ = factor > 1;  // the step after a leap says nothing of the shrinking
+    last_step_ = log_step;
+    return log_sigma + factor * log_step;
+  }
+
+ private:
+  double last_step_ = 0;
+  bool extrapolated_ = false;
+};
+
+}  // namespace
+
 std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
                                            ArmSigma start, const RefinementOptions& options) {
-  constexpr int kIterationsMax =
-      300;  // a step is about 50 us for 25 views; slow where the camera is weaker than the arm
+  constexpr int kIterationsMax = 300;  // a step is about 50 us for 25 views
   constexpr double kChangeMin = 2e-5;
+  Accelerated translation, rotation;
   for (int i = 0; i < kIterationsMax; ++i) {
     const auto solution = solve_linear(views, deviations, start);
     if (!solution) return std::nullopt;
     const ArmSigma next = next_arm_sigma(solution->deviations, solution->deviation_covariance, options);
-    const double change = std::max(std::abs(std::log(next.translation_m / start.translation_m)),
-                                   std::abs(std::log(next.rotation_rad / start.rotation_rad)));
-    start = next;
-    if (change < kChangeMin) break;
+    const double translation_step = std::log(next.translation_m / start.translation_m);
+    const double rotation_step = std::log(next.rotation_rad / start.rotation_rad);
+    if (std::max(std::abs(translation_step), std::abs(rotation_step)) < kChangeMin) return next;
+    start.translation_m = std::max(std::min(next.translation_m, options.arm_sigma_min.translation_m),
+                                   std::exp(translation.next(std::log(start.translation_m), translation_step)));
+    start.rotation_rad = std::max(std::min(next.rotation_rad, options.arm_sigma_min.rotation_rad),
+                                  std::exp(rotation.next(std::log(start.rotation_rad), rotation_step)));
   }
   return start;
 }

@@ -98,6 +98,17 @@ struct Fit {
   LinearizedBundle bundle;
 };
 
+/// What an estimated sigma must be taken for in a covariance: with v degrees of freedom its square is uncertain, and
+/// the errors scatter by v / (v - 2) more than it says (Student 1908). Three for each view, less half of the twelve
+/// unknowns.
+ArmSigma as_unsure(ArmSigma sigma, std::size_t views, const RefinementOptions& options) {
+  const double freedom = std::max(3.0, 3 * static_cast<double>(views) - 6);
+  const double factor = std::sqrt(freedom / (freedom - 2));
+  if (options.arm_sigma.translation_m <= 0) sigma.translation_m *= factor;
+  if (options.arm_sigma.rotation_rad <= 0) sigma.rotation_rad *= factor;
+  return sigma;
+}
+
 /// Rounds of solving and estimating the sigmas, until these settle.
 Result<Fit> fit_bundle(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const BundleView> views,
                        Fit fit, const RefinementOptions& options) {
@@ -130,6 +141,9 @@ Result<Fit> fit_bundle(const CameraIntrinsics& camera, const BoardSpec& board, s
                                     std::abs(fit.noise.arm_sigma.rotation_rad / before.arm_sigma.rotation_rad - 1)});
     if (change < kSettled) break;
   }
+  const auto unsure =
+      solve_linear(fit.bundle.views, fit.state.deviations, as_unsure(fit.noise.arm_sigma, views.size(), options));
+  if (unsure) fit.linear.covariance = unsure->covariance;
   return fit;
 }
 

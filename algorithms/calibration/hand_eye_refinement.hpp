@@ -20,8 +20,9 @@ struct ArmSigma {
 struct RefinementOptions {
   double corner_sigma_px = 0;  ///< 0: estimated from the residuals
   ArmSigma arm_sigma;          ///< 0: estimated (each by itself)
-  /// Lower bounds of the estimates: below the repeatability of good arms, far above rounding.
-  ArmSigma arm_sigma_min{2e-5, 2e-5};
+  /// Lower bounds of the estimates: a quarter of what 48 corners of 0.1 px tell of one view (20 um), so that a perfect
+  /// arm is believed; far above rounding.
+  ArmSigma arm_sigma_min{5e-6, 5e-6};
   /// What the arm is known to be good for; 0: nothing is known. Few views tell the arm's share of the errors badly from
   /// the camera's, and the estimate then falls to its lower bound: below this it counts like two views of its own.
   ArmSigma arm_sigma_expected;
