@@ -36,7 +36,7 @@ struct OpenView {
 
 /// Index of the true choice of each view: under random fours of views in closed form, with each combination of their
 /// choices, the one under which all views agree best on the board's place. The first view is not reversed. All 0 with
-/// fewer than four views or when nothing can be told. 40 fours: 1 ms for each combination of a four (2 to 128).
+/// fewer than four views or when nothing can be told. 3 to 7 ms for 4 to 30 views of two choices each.
 [[nodiscard]] std::vector<std::size_t> settle_choices(std::span<const OpenView> views);
 
 /// The same with a known hand-eye transform, from two views on.

@@ -26,6 +26,8 @@ struct Disc {
 /// A dark ellipse from its contour; empty when the contour is none.
 std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
   constexpr double kAreaMin_px2 = 20, kElongationMax = 3.2, kAreaOfEllipseMin = 0.85, kAreaOfEllipseMax = 1.15;
+  constexpr std::size_t kOutlineMin = 8;  // points: fewer enclose less than the least area
+  if (contour.size() < kOutlineMin) return std::nullopt;
   const cv::Moments m = cv::moments(contour);
   if (m.m00 < kAreaMin_px2) return std::nullopt;
   const double xx = m.mu20 / m.m00, yy = m.mu02 / m.m00, xy = m.mu11 / m.m00;
@@ -38,17 +40,13 @@ std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
   return Disc{{m.m10 / m.m00, m.m01 / m.m00}, std::sqrt(m.m00 / M_PI)};
 }
 
-/// False for a picture of noise, which it is at every window.
-bool add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
+void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
   constexpr double kDarker = 7;  // grey levels below the mean of the window
   cv::Mat dark;
   cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
   std::vector<std::vector<cv::Point>> contours;
   std::vector<cv::Vec4i> tree;
   cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  // White noise has a contour for every 60 pixels, the densest grid that can be read for every 100.
-  constexpr std::size_t kPixelsMin = 100, kAlways = 6000;
-  if (contours.size() > std::max(kAlways, dark.total() / kPixelsMin)) return false;
   for (std::size_t i = 0; i < contours.size(); ++i) {
     constexpr int kParent = 3;
     if (tree[i][kParent] >= 0) continue;
@@ -56,7 +54,6 @@ bool add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
     const auto same = [&](const Disc& d) { return (d.center - disc->center).norm() < d.radius_px / 2; };
     if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);
   }
-  return true;
 }
 
 /// Centre of the darkness in a window around the disc: each pixel counts with the part of it that ink covers.
@@ -230,7 +227,7 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
   std::vector<std::size_t> grid;
   std::vector<Disc> discs;
   for (const int window : kWindows_px) {
-    if (!add_discs(smooth, window, discs)) break;
+    add_discs(smooth, window, discs);
     grid = find_grid(discs, board);
     if (!grid.empty()) break;
   }

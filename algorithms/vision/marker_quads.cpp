@@ -49,18 +49,13 @@ std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_m
   return quad;
 }
 
-/// False for a picture of noise, which it is at every window.
-bool add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
+void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
   constexpr double kDarker = 7;  // grey levels below the mean of the window
   cv::Mat dark;
   cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
   std::vector<std::vector<cv::Point>> contours;
   std::vector<cv::Vec4i> tree;
   cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  // White noise has a contour for every 60 pixels, the densest board that can be read (2.5 pixels a cell) for every
-  // 150.
-  constexpr std::size_t kPixelsMin = 100, kAlways = 6000;
-  if (contours.size() > std::max(kAlways, dark.total() / kPixelsMin)) return false;
   for (std::size_t i = 0; i < contours.size(); ++i) {
     constexpr int kParent = 3;
     if (tree[i][kParent] >= 0) continue;  // the inner edge of a dark ring
@@ -71,7 +66,6 @@ bool add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vec
       quads.push_back(*quad);
     }
   }
-  return true;
 }
 
 std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
@@ -86,7 +80,7 @@ std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
   searched = smooth;
   std::vector<Quad> quads;
   for (const int window : kWindows_px) {
-    if (!add_quads(searched, window, half ? side_min_px / 2 : side_min_px, quads)) break;
+    add_quads(searched, window, half ? side_min_px / 2 : side_min_px, quads);
   }
   if (!half) return quads;
   for (Quad& quad : quads) {

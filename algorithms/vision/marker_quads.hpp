@@ -20,8 +20,8 @@ using Quad = std::array<Eigen::Vector2d, 4>;
 /// @return kOutOfMemory
 [[nodiscard]] Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px = 10);
 
-/// How well a quadrangle must be known: well enough that its cells can be read (a fifth of a pixel; a fifth of the
-/// time), or as well as the image tells.
+/// How well a quadrangle must be known: well enough that its cells can be read (0.06 px off from a start within a
+/// pixel, in half the time), or as well as the image tells.
 enum class QuadFit : std::uint8_t { kToRead, kToMeasure };
 
 /// Moves each side onto the edge between dark and white (subpixel edge points, a line through them, or a parabola where

@@ -127,6 +127,35 @@ TEST_CASE("boards of markers may be half hidden, the others may not", "[vision][
   }
 }
 
+TEST_CASE("a fine texture behind the target does not hide it", "[vision][target]") {
+  // At this size the texture has more outlines than any limit of a few ten thousand would let pass.
+  constexpr CameraIntrinsics large{1280, 1024, 1069.6, 1069.6, 640, 512, 0, 0, 0, 0, 0};
+  for (const std::size_t kind : {std::size_t{0}, std::size_t{2}, std::size_t{5}, std::size_t{8}}) {
+    const BoardSpec& board = kCases[kind].board;
+    const Pose pose = look_at_board(board, 0.8, 0.2, 1, 0.3);
+    const InkExtent ink = ink_extent(board);
+    const Pose board_T_camera = pose.inverse(Eigen::Isometry);
+    const test::DrawnImage drawn = draw_board(large, board, pose);
+    for (const int depth : {60, 120, 255}) {
+      test::DrawnImage image = drawn;
+      Random random(9);
+      for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+        const auto at = static_cast<int>(i);
+        const Eigen::Vector3d ray((at % large.width - large.cx) / large.fx, (at / large.width - large.cy) / large.fy,
+                                  1);
+        const Eigen::Vector3d way = board_T_camera.linear() * ray, from = board_T_camera.translation();
+        const Eigen::Vector2d hit = (from - from.z() / way.z() * way).head<2>();
+        const double beyond = ((hit - ink.center_m).cwiseAbs() - ink.size_m / 2).maxCoeff();
+        if (beyond <= std::max(0.01, quiet_zone_m(board))) continue;
+        image.pixels[i] = static_cast<std::uint8_t>(std::clamp(130 - depth / 2 + random.below(depth + 1), 0, 255));
+      }
+      CAPTURE(kCases[kind].name, depth);
+      const auto found = detect_target(image.view(), board);
+      CHECK(found);
+    }
+  }
+}
+
 TEST_CASE("half a board of markers gives the pose, whichever half is hidden", "[vision][target]") {
   for (const Case& c : kCases) {
     if (!c.board.allows_partial_views() || c.board.markers() < 2) continue;
