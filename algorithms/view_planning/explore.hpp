@@ -15,7 +15,7 @@ struct ExploreOptions {
   std::uint32_t step = 0;                   ///< number of this choice: other candidates each time
   int tries_per_candidate = 40;             ///< random configurations drawn for one that is free
   std::uint32_t gain_min = 8;               ///< unknown voxels that make a view worth it (k of the certificate)
-  std::uint32_t again_min = 100;            ///< or voxels that it makes usable for motion
+  std::uint32_t again_min = 30;             ///< or voxels that it makes usable for motion
   int plans_max = 24;                       ///< candidates that the planner may try; twice as many for the certificate
   int plan_iterations_max = 400;            ///< for one of them
   std::span<const JointVector> trail = {};  ///< PlannerOptions::trail
