@@ -18,7 +18,8 @@ Pixels in_columns(const Pixels& given, const BoardSpec& board, const CameraIntri
   Pixels pixels;
   for (int i = 0; i < board.corners(); ++i) {
     const int row = i / board.inner_columns, column = i % board.inner_columns;
-    pixels.push_back(given[static_cast<std::size_t>(column * board.inner_rows + row)]);
+    const int at = column * board.inner_rows + row;
+    pixels.push_back(given[static_cast<std::size_t>(at)]);
   }
   return pixels;
 }
@@ -28,7 +29,8 @@ Pixels there_and_back(const Pixels& given, const BoardSpec& board, const CameraI
   for (int i = 0; i < board.corners(); ++i) {
     const int row = i / board.inner_columns, column = i % board.inner_columns;
     const int in_row = row % 2 == 0 ? column : board.inner_columns - 1 - column;
-    pixels.push_back(given[static_cast<std::size_t>(row * board.inner_columns + in_row)]);
+    const int at = row * board.inner_columns + in_row;
+    pixels.push_back(given[static_cast<std::size_t>(at)]);
   }
   return pixels;
 }

@@ -59,7 +59,11 @@ Handled on_plan(Machine& m, const MachineEvent& event) {
 
 void enter_move(Machine& m) {
   Progress& p = m.progress();
-  m.show("view {}: expecting {:.0f} new voxels", next_number(p), p.chosen.gain_expected);
+  if (p.chosen.gain_expected > 0) {
+    m.show("view {}: expecting {:.0f} new voxels", next_number(p), p.chosen.gain_expected);
+  } else {
+    m.show("view {}: another look, to have room to move", next_number(p));
+  }
   m.start_trip(p.chosen.path, true);
 }
 
