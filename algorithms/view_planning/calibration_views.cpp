@@ -12,8 +12,8 @@
 namespace firstlook {
 namespace {
 
-constexpr std::uint64_t kStream = 4400;  // of random numbers; one for each choice
-constexpr std::size_t kFeasibleMax = 400;
+constexpr std::uint64_t kStream = 4400;    // of random numbers; one for each choice
+constexpr std::size_t kBestMax = 64;       // candidates kept for the planner to try
 constexpr double kNearby_rad = 0.3;        // standard deviation of each joint around an earlier view
 constexpr double kTargetMargin_m = 0.005;  // states with less trap the arm (FACTS 3)
 constexpr double kDegree_rad = std::numbers::pi / 180;
@@ -29,8 +29,9 @@ struct Search {
   const JointVector& current;
   const CalibrationViewOptions& options;
   Random random;
-  FixedVector<Candidate, kFeasibleMax> feasible;
+  FixedVector<Candidate, kBestMax> best;  ///< cheapest first; of equal ones the earlier
   int considered = 0;
+  int feasible = 0;
 };
 
 double cost_of(const Matrix6d& covariance, const CalibrationViewOptions& options) {
@@ -44,18 +45,30 @@ bool is_new(const Search& s, const JointVector& q) {
   });
 }
 
+void keep_when_good(Search& s, const Candidate& candidate) {
+  if (s.best.full()) {
+    if (candidate.cost >= s.best.back().cost) return;
+    s.best.pop_back();
+  }
+  const auto place = std::upper_bound(s.best.begin(), s.best.end(), candidate,
+                                      [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+  const auto at = place - s.best.begin();
+  s.best.push_back(candidate);
+  std::rotate(s.best.begin() + at, s.best.end() - 1, s.best.end());
+}
+
 /// Keeps q when it is new, sees the whole board, is free and does not hide the board: from cheap to dear.
 void consider(Search& s, const JointVector& q) {
   ++s.considered;
-  if (s.feasible.full() || !is_new(s, q)) return;
+  if (!is_new(s, q)) return;
   const CalibrationViewInputs& in = s.inputs;
   const LinkFrames frames = forward(in.arm, q);
   if (check_view(in.model, frames.flange(), s.options.limits) != ViewFault::kNone) return;
   if (!configuration_is_free(in.arm, in.body, in.space, in.clearance, q, kTargetMargin_m)) return;
   if (hides_board(in.model, place(in.body.capsules, frames), frames.flange())) return;
   const Matrix12d information = in.information + view_information(in.model, frames.flange());
-  const double cost = cost_of(predicted_covariance(information), s.options);
-  s.feasible.push_back({q, cost});
+  ++s.feasible;
+  keep_when_good(s, {q, cost_of(predicted_covariance(information), s.options)});
 }
 
 void draw_aimed(Search& s) {
@@ -138,22 +151,21 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
            .current = current,
            .options = options,
            .random = Random(options.seed, kStream + (std::uint64_t{options.step} << 20)),
-           .feasible = {},
-           .considered = 0};
+           .best = {},
+           .considered = 0,
+           .feasible = 0};
   draw_nearby(s);
   draw_random(s);
   draw_aimed(s);
-  std::stable_sort(s.feasible.begin(), s.feasible.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
 
   CalibrationViewChoice choice;
   choice.considered = s.considered;
-  choice.feasible = static_cast<int>(s.feasible.size());
+  choice.feasible = s.feasible;
   choice.before = predicted_covariance(inputs.information);
   choice.after = choice.before;
   const double cost_max = cost_of(choice.before, options) * (1 - options.cost_drop_min);
   int plans = 0;
-  for (const Candidate& candidate : s.feasible) {
+  for (const Candidate& candidate : s.best) {
     if (candidate.cost > cost_max) {
       choice.outcome = CalibrationViewChoice::Outcome::kNoneHelps;
       break;

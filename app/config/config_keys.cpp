@@ -78,6 +78,8 @@ void add_space_keys(Keys& keys, Config& c) {
 
 constexpr std::array<std::string_view, 2> kYesNo = {"no", "yes"};
 
+constexpr std::array<std::string_view, 2> kCalibrationViews = {"designed", "fixed48"};
+
 void add_calibration_keys(Keys& keys, Config& c) {
   Config::Calibration& k = c.calibration;
   keys.push_back({"board.type", &c.board.type, 0, 0, target_type_names(),
@@ -114,6 +116,9 @@ void add_calibration_keys(Keys& keys, Config& c) {
   keys.push_back({"board.detector", &c.board.detector, 0, 0, detector_preset_names(),
                   "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
+  keys.push_back(
+      {"calibration.views", &k.views, 0, 0, kCalibrationViews,
+       "designed: each for what it adds; fixed48: a list that moves the board over the picture, to compare"});
   keys.push_back({"calibration.views_min", &k.views_min, 3, 60, {}, "views of the board to take at least"});
   keys.push_back({"calibration.views_max", &k.views_max, 3, 60, {}, "and at most"});
   keys.push_back({"calibration.holdout_views", &k.holdout_views, 0, 20, {}, "views kept out of the solve, to test it"});
@@ -265,6 +270,10 @@ std::string broken_rule(const Config& c) {
   }
   if (c.depth.range_min_m >= c.depth.range_trusted_m) return "depth.range_min_m must be below depth.range_trusted_m";
   if (c.depth.range_trusted_m > c.depth.range_max_m) return "depth.range_trusted_m must not exceed depth.range_max_m";
+  if (c.calibration.views == "fixed48" && c.calibration.views_max < 52) {
+    return "calibration.views: fixed48 takes 48 views after the 4 that find the camera: set calibration.views_max to "
+           "52";
+  }
   if (c.calibration.views_min > c.calibration.views_max) {
     return "calibration.views_min must not exceed calibration.views_max";
   }

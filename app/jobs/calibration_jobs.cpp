@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "algorithms/calibration/view_spread.hpp"
+#include "algorithms/view_planning/fixed_views.hpp"
 #include "algorithms/vision/camera_model.hpp"
 #include "app/jobs/workbench.hpp"
 
@@ -116,13 +117,15 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
   const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, *model, information, taken};
+  const bool fixed = config_.calibration.views == "fixed48";
   CalibrationViewResult result;
   const PredictedSigma sigma = predicted_sigma(predicted_covariance(information));
   result.sigma_mm = 1000 * sigma.translation_m;
   result.sigma_mrad = 1000 * sigma.rotation_rad;
-  result.target_met = result.sigma_mm <= config_.calibration.target_sigma_mm &&
+  result.target_met = !fixed && result.sigma_mm <= config_.calibration.target_sigma_mm &&
                       result.sigma_mrad <= config_.calibration.target_sigma_mrad;
-  auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
+  auto choice = fixed ? next_fixed_view(inputs, planner_, here.at_rad, fixed_next_, options)
+                      : firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
   const auto found = [&] { return choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen; };
   const bool too_few = observations_.size() < static_cast<std::size_t>(config_.calibration.views_min);
   if (!found() && too_few) {

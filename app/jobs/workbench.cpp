@@ -132,8 +132,11 @@ Status Workbench::take_memory() {
   auto self = memory::PoolBuffer<float>::make(memory::Pool::kDistanceField, depth_pixels);
   if (!self) return std::unexpected(self.error());
   self_depth_ = std::move(*self);
+  // Pictures of the first views that fit; the report shows the corners of the others without.
+  const std::size_t pictures_fit = memory::budget_row(memory::Pool::kReportBuffers).bytes() / color_pixels;
   auto pictures = memory::PoolBuffer<std::uint8_t>::make(
-      memory::Pool::kReportBuffers, color_pixels * static_cast<std::size_t>(config_.calibration.views_max));
+      memory::Pool::kReportBuffers,
+      color_pixels * std::min(pictures_fit, static_cast<std::size_t>(config_.calibration.views_max)));
   if (!pictures) return std::unexpected(pictures.error());
   pictures_ = std::move(*pictures);
   return {};

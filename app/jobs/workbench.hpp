@@ -173,6 +173,7 @@ class Workbench {
   std::vector<Observation> observations_;
   Turns bootstrap_;
   std::size_t bootstrap_next_ = 0;
+  int fixed_next_ = 0;                 ///< of next_fixed_view
   std::size_t bootstrap_centers_ = 0;  ///< views around which bootstrap views were made
   std::optional<HandEyeResult> hand_eye_;
   std::uint32_t verification_looks_ = 0;  ///< with or without the board

@@ -42,8 +42,9 @@ Config all_changed() {
   c.parking_rad = JointVector{0, -1.5707963267948966, 1e-17, 0.5, -0.25, 3};
   c.board = {"charuco", 7, 5, 0.0251, 0.018, "5x5_100", 3, "yes", "thesis2014"};
   c.calibration = {"tsai-lenz",
+                   "fixed48",
                    9,
-                   31,
+                   53,
                    5,
                    0.3,
                    0.6,
@@ -151,6 +152,7 @@ TEST_CASE("rules between keys hold", "[config]") {
   CHECK_THAT(refused("depth: {range_min_m: 3.5}", Fault::kConfigBadValue), Contains("range_trusted_m"));
   CHECK_THAT(refused("depth: {range_max_m: 2}", Fault::kConfigBadValue), Contains("range_max_m"));
   CHECK_THAT(refused("calibration: {views_min: 31}", Fault::kConfigBadValue), Contains("views_max"));
+  CHECK_THAT(refused("calibration: {views: fixed48}", Fault::kConfigBadValue), Contains("views_max to 52"));
   CHECK_THAT(refused("calibration: {views_min: 6}", Fault::kConfigBadValue), Contains("holdout_views"));
   CHECK_THAT(refused("keep_out: [{low_m: [1,0,0], high_m: [0,1,1]}]", Fault::kConfigBadValue), Contains("keep_out"));
 }
