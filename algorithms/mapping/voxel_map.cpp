@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "algorithms/kinematics/self_collision.hpp"
 #include "platform/core/ensure.hpp"
 
 namespace firstlook {
@@ -105,6 +106,14 @@ void VoxelMap::set_safe_zone(const SafeZone& zone) {
   }
 }
 
+void VoxelMap::note_fixed_body(const Capsule& capsule, double margin_m) {
+  const double reach_m = capsule.radius_m + margin_m + geometry_.resolution_m / 2;
+  for (std::size_t i = 0; i < flags_.size(); ++i) {
+    const Eigen::Vector3d center = geometry_.center_m(geometry_.voxel_at(i));
+    if (segment_distance_m(center, center, capsule.a, capsule.b) < reach_m) flags_[i] |= kFixedBody;
+  }
+}
+
 bool VoxelMap::in_intact_safe_zone(std::size_t index) const {
   return has_motion_planes() && (flags_[index] & (kInSafeZone | kZoneRevoked)) == kInSafeZone;
 }
@@ -177,8 +186,10 @@ void VoxelMap::hit(std::size_t index, const Frame& frame, FrameChange& change) {
   const int before = value == kUnknownLogOdds ? 0 : value;
   value = static_cast<std::int8_t>(std::min(before + kHitLogOdds, kLogOddsMax));
   if (!has_motion_planes()) return;
-  change.zone_revoked += in_intact_safe_zone(index);
-  if ((flags_[index] & kInSafeZone) != 0) flags_[index] |= kZoneRevoked;
+  if (in_intact_safe_zone(index) && !is_fixed_body(index)) {
+    ++change.zone_revoked;
+    flags_[index] |= kZoneRevoked;
+  }
   flags_[index] |= kHitInLatestFrame;
   seen_s_[index] = frame.stamp_s;
 }
@@ -224,11 +235,12 @@ void VoxelMap::set(std::size_t index, VoxelClass voxel_class, double stamp_s) {
   constexpr std::int8_t kValues[] = {kUnknownLogOdds, kLogOddsMin, kLogOddsMax};
   log_odds_[index] = kValues[static_cast<std::size_t>(voxel_class)];
   if (!has_motion_planes()) return;
-  constexpr std::uint8_t kKept = kInSafeZone | kZoneRevoked | kBlocked;
+  constexpr std::uint8_t kKept = kInSafeZone | kZoneRevoked | kBlocked | kFixedBody;
   flags_[index] = static_cast<std::uint8_t>(flags_[index] & kKept);
   if (voxel_class == VoxelClass::kFree) flags_[index] |= kFreeFromTwoPoses;
   if (voxel_class == VoxelClass::kOccupied) flags_[index] |= kHitInLatestFrame;
-  if (voxel_class == VoxelClass::kOccupied && (flags_[index] & kInSafeZone) != 0) flags_[index] |= kZoneRevoked;
+  const bool revokes = voxel_class == VoxelClass::kOccupied && !is_fixed_body(index);
+  if (revokes && (flags_[index] & kInSafeZone) != 0) flags_[index] |= kZoneRevoked;
   octants_[index] = {.surface = static_cast<std::uint8_t>(voxel_class == VoxelClass::kOccupied ? 0xFF : 0),
                      .crossed = static_cast<std::uint8_t>(voxel_class == VoxelClass::kFree ? 0xFF : 0)};
   first_free_pose_[index] = 0;

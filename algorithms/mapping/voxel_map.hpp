@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/mapping/grid_geometry.hpp"
 #include "algorithms/mapping/safe_zone.hpp"
 #include "platform/core/transform.hpp"
@@ -107,6 +108,12 @@ class VoxelMap {
   /// Safety rule 2: voxels entirely inside the cylinder count as free for motion until a hit. Replaces an earlier zone
   /// and forgets its revocations. Log-odds stay untouched.
   void set_safe_zone(const SafeZone& zone);
+  /// Voxels that parts of the arm which never move fill at least in part (within `margin_m`): hits there are the arm
+  /// itself, seen at its edge, and leave the safe zone as it is.
+  void note_fixed_body(const Capsule& capsule, double margin_m);
+  [[nodiscard]] bool is_fixed_body(std::size_t index) const {
+    return has_motion_planes() && (flags_[index] & kFixedBody) != 0;
+  }
   [[nodiscard]] bool in_intact_safe_zone(std::size_t index) const;
   [[nodiscard]] bool zone_revoked(std::size_t index) const;
 
@@ -159,6 +166,7 @@ class VoxelMap {
     kZoneRevoked = 8,
     kBlocked = 16,
     kForgotten = 32,
+    kFixedBody = 64,
   };
 
   /// The frame being applied.

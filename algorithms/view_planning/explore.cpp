@@ -16,7 +16,9 @@ constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each ca
 // states with less than 1 mm trap the arm).
 constexpr double kTargetMargin_m = 0.005;
 constexpr double kNearby_rad = 0.35;  // standard deviation of each joint around an earlier view
+constexpr double kHereShare = 0.25;   // of those: around where the arm is, which has just seen something new
 constexpr int kAimedTries = 10;       // for one of another source: most are given up before they cost anything
+constexpr int kInVainMax = 6;         // views in a row that make room for motion, and nothing comes of it
 constexpr double kStandOffMin_m = 0.6;
 constexpr double kStandOffMax_m = 1.5;
 constexpr double kAimCone_rad = 1.2;  // about the direction from unknown to free: 70 degrees, beyond it is grazing
@@ -59,7 +61,7 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
     : gain_(geometry, sensor, sampling), candidates_max_(candidates_max) {
   ENSURE(4531, candidates_max > 0 && workers_max > 0 && certificate_samples_max > 0);
   for (int i = 0; i < workers_max; ++i) workers_.push_back(gain_.worker());
-  const auto room = static_cast<std::size_t>(std::max(candidates_max, 2 * certificate_samples_max));
+  const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
   candidates_.resize(room);
   order_.reserve(room);
   unreached_.reserve(room);
@@ -68,7 +70,7 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
 std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, int candidates_max, int workers_max,
                                         int certificate_samples_max, const GainSampling& sampling) {
   const auto rays = static_cast<std::size_t>(sampling.columns) * static_cast<std::size_t>(sampling.rows);
-  const auto room = static_cast<std::size_t>(std::max(candidates_max, 2 * certificate_samples_max));
+  const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
   const std::size_t worker = geometry.count() + rays * sizeof(Eigen::Vector3d);
   return GainModel::required_bytes(geometry, sampling) + static_cast<std::size_t>(workers_max) * worker +
          room * (sizeof(Candidate) + 2 * sizeof(int));
@@ -89,8 +91,9 @@ JointVector ViewChooser::draw_random(const Task& task, Random& random) const {
 
 JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
   const ArmModel& arm = task.context.arm;
-  const int pick = random.below(static_cast<int>(visited_.size()) + 1);
-  JointVector q = pick == 0 ? task.current : visited_[static_cast<std::size_t>(pick) - 1];
+  const bool here = visited_.empty() || random.uniform() < kHereShare;
+  JointVector q =
+      here ? task.current : visited_[static_cast<std::size_t>(random.below(static_cast<int>(visited_.size())))];
   for (int j = 0; j < arm.joints; ++j) {
     const auto i = static_cast<std::size_t>(j);
     q[j] = std::clamp(q[j] + kNearby_rad * random.normal(), arm.lower_rad[i] + kLimitMargin_rad,
@@ -136,14 +139,14 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
   const ViewContext& c = task.context;
   const std::uint64_t block = (static_cast<std::uint64_t>(task.options.step) << 1) | (task.certificate ? 1U : 0U);
   Random random(task.options.seed, kStream + (block << 20) + static_cast<std::uint64_t>(index));
-  // An ordinary choice takes turns; the certificate's first half is random, its second half aimed.
-  const int source = task.certificate ? (index < task.samples ? 0 : 2) : index % 3;
+  // They take turns: random, nearby, aimed.
+  const int source = index % kSources;
   out = Candidate{};
   const int tries_max = task.options.tries_per_candidate * (source == 2 ? kAimedTries : 1);
   while (!out.free && out.tries < tries_max) {
     ++out.tries;
     if (source == 2) {
-      out.free = draw_aimed(task, index - (task.certificate ? task.samples : 0), random, out.q);
+      out.free = draw_aimed(task, index / kSources, random, out.q);
       continue;
     }
     out.q = source == 0 ? draw_random(task, random) : draw_nearby(task, random);
@@ -151,8 +154,20 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
   }
 }
 
-bool ViewChooser::worthwhile(const Candidate& candidate, const ExploreOptions& options) const {
-  return candidate.free && (candidate.gain.unknown >= options.gain_min || candidate.gain.again >= options.again_min);
+/// A view that only makes room for motion pays when a later one looks into something unknown from there.
+void ViewChooser::note_progress(const ExploreOptions& options) {
+  const std::size_t unknown = gain_.unknown();
+  if (unknown + options.gain_min <= unknown_) {
+    in_vain_ = 0;
+  } else if (made_room_only_) {
+    ++in_vain_;
+  }
+  unknown_ = unknown;
+  made_room_only_ = false;
+}
+
+bool ViewChooser::worthwhile(const Task& task, const Candidate& candidate) {
+  return candidate.free && (candidate.gain.unknown >= task.options.gain_min || candidate.gain.again >= task.again_min);
 }
 
 void ViewChooser::score(const Task& task, RunParallel run_parallel) {
@@ -162,19 +177,18 @@ void ViewChooser::score(const Task& task, RunParallel run_parallel) {
     find_candidate(task, index, candidate);
     if (!candidate.free) return;
     candidate.gain = gain_.count(task.context, candidate.q, workers_[static_cast<std::size_t>(worker)]);
-    if (!worthwhile(candidate, task.options)) return;
+    if (!worthwhile(task, candidate)) return;
     const double move_s =
         time_segment(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits).duration_s;
     candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
   };
-  run_parallel(task.certificate ? 2 * task.samples : task.samples, score_one);
+  run_parallel(task.candidates(), score_one);
 }
 
 void ViewChooser::rank(const Task& task) {
   order_.clear();
-  const int n = task.certificate ? 2 * task.samples : task.samples;
-  for (int i = 0; i < n; ++i) {
-    if (worthwhile(candidates_[static_cast<std::size_t>(i)], task.options)) order_.push_back(i);
+  for (int i = 0; i < task.candidates(); ++i) {
+    if (worthwhile(task, candidates_[static_cast<std::size_t>(i)])) order_.push_back(i);
   }
   std::sort(order_.begin(), order_.end(), [&](int a, int b) {
     const double ua = candidates_[static_cast<std::size_t>(a)].utility_per_s;
@@ -228,7 +242,7 @@ Status ViewChooser::plan_best(const Task& task, ViewChoice& choice) {
 
 bool ViewChooser::can_move(const Task& task) const {
   const ViewContext& c = task.context;
-  const auto last = candidates_.begin() + 2 * task.samples;
+  const auto last = candidates_.begin() + task.candidates();
   return std::any_of(candidates_.begin(), last, [&](const Candidate& candidate) {
     return candidate.free && certify(c.arm, c.body, c.space, c.clearance, task.current, candidate.q).certified();
   });
@@ -237,11 +251,13 @@ bool ViewChooser::can_move(const Task& task) const {
 void ViewChooser::certify_end(const Task& task, ViewChoice& choice) const {
   TerminationCertificate& certificate = choice.certificate;
   certificate.gain_min = task.options.gain_min;
-  for (int i = 0; i < 2 * task.samples; ++i) {
+  for (int i = 0; i < task.candidates(); ++i) {
     const Candidate& candidate = candidates_[static_cast<std::size_t>(i)];
     if (!candidate.free) continue;
-    ++(i < task.samples ? certificate.random_samples : certificate.aimed_samples);
-    if (!worthwhile(candidate, task.options)) {
+    ++(i % kSources == 0   ? certificate.random_samples
+       : i % kSources == 1 ? certificate.nearby_samples
+                           : certificate.aimed_samples);
+    if (!worthwhile(task, candidate)) {
       certificate.gain_best = std::max(certificate.gain_best, candidate.gain.unknown);
     }
   }
@@ -252,28 +268,32 @@ void ViewChooser::certify_end(const Task& task, ViewChoice& choice) const {
 
 Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVector& current,
                                        const ExploreOptions& options, RunParallel run_parallel) {
-  ENSURE(4532, 2 * static_cast<std::size_t>(options.certificate_samples) <= candidates_.size());
+  ENSURE(4532, kSources * static_cast<std::size_t>(options.certificate_samples) <= candidates_.size());
   gain_.prepare(context);
+  note_progress(options);
   ViewChoice choice;
   Task task{.context = context,
             .current = current,
             .options = options,
             .depth_T_flange = context.flange_T_depth.inverse(),
+            .again_min = in_vain_ < kInVainMax ? options.again_few : options.again_min,
             .certificate = false,
             .samples = candidates_max_};
   for (const bool certificate : {false, true}) {
     task.certificate = certificate;
     task.samples = certificate ? options.certificate_samples : candidates_max_;
     score(task, run_parallel);
-    const int n = certificate ? 2 * task.samples : task.samples;
-    for (int i = 0; i < n; ++i) {
+    for (int i = 0; i < task.candidates(); ++i) {
       choice.considered += candidates_[static_cast<std::size_t>(i)].tries;
       choice.free += candidates_[static_cast<std::size_t>(i)].free ? 1 : 0;
     }
     rank(task);
     choice.worthwhile += static_cast<int>(order_.size());
     if (Status planned = plan_best(task, choice); !planned) return std::unexpected(planned.error());
-    if (choice.outcome == ViewChoice::Outcome::kChosen) return choice;
+    if (choice.outcome == ViewChoice::Outcome::kChosen) {
+      made_room_only_ = choice.gain.unknown < options.gain_min;
+      return choice;
+    }
     choice.certificate.unreached += static_cast<int>(order_.size());
   }
   certify_end(task, choice);

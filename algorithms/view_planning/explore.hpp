@@ -15,17 +15,19 @@ struct ExploreOptions {
   std::uint32_t step = 0;                   ///< number of this choice: other candidates each time
   int tries_per_candidate = 40;             ///< random configurations drawn for one that is free
   std::uint32_t gain_min = 8;               ///< unknown voxels that make a view worth it (k of the certificate)
-  std::uint32_t again_min = 30;             ///< or voxels that it makes usable for motion
+  std::uint32_t again_min = 100;            ///< or voxels that it makes usable for motion
+  std::uint32_t again_few = 30;             ///< the same while such views still open the way to something unknown
   int plans_max = 24;                       ///< candidates that the planner may try; twice as many for the certificate
   int plan_iterations_max = 400;            ///< for one of them
   std::span<const JointVector> trail = {};  ///< PlannerOptions::trail
-  int certificate_samples = 2000;           ///< random configurations, and as many aimed at the frontier
+  int certificate_samples = 2000;           ///< random configurations, as many around the views taken, as many aimed
   ViewTiming timing;
 };
 
 /// Why exploration ends: every sampled view that can be reached sees fewer than `gain_min` unknown voxels.
 struct TerminationCertificate {
   int random_samples = 0;  ///< free configurations drawn at random
+  int nearby_samples = 0;  ///< drawn around where the arm is and has been
   int aimed_samples = 0;   ///< free configurations aimed at frontier voxels
   std::uint32_t gain_min = 0;
   std::uint32_t gain_best = 0;  ///< of all samples that can be reached
@@ -77,6 +79,7 @@ class ViewChooser {
   [[nodiscard]] Planner& planner() { return planner_; }
 
  private:
+  static constexpr int kSources = 3;  ///< of candidates, which take turns: random, nearby, aimed
   struct Candidate {
     JointVector q;
     ViewGain gain;
@@ -90,8 +93,10 @@ class ViewChooser {
     const JointVector& current;
     const ExploreOptions& options;
     Transform<Depth, Flange> depth_T_flange;
-    bool certificate = false;  ///< the large sample
-    int samples = 0;
+    std::uint32_t again_min = 0;  ///< voxels made usable for motion that are worth a view now
+    bool certificate = false;     ///< the large sample
+    int samples = 0;              ///< in all; of each source for the certificate
+    [[nodiscard]] int candidates() const { return certificate ? kSources * samples : samples; }
   };
 
   [[nodiscard]] JointVector draw_random(const Task& task, Random& random) const;
@@ -99,7 +104,8 @@ class ViewChooser {
   [[nodiscard]] bool draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const;
   void find_candidate(const Task& task, int index, Candidate& out) const;
   void score(const Task& task, RunParallel run_parallel);
-  [[nodiscard]] bool worthwhile(const Candidate& candidate, const ExploreOptions& options) const;
+  void note_progress(const ExploreOptions& options);
+  [[nodiscard]] static bool worthwhile(const Task& task, const Candidate& candidate);
   void rank(const Task& task);
   [[nodiscard]] Status plan_best(const Task& task, ViewChoice& choice);
   [[nodiscard]] bool beside_unreached(const Task& task, const JointVector& q_rad) const;
@@ -107,6 +113,9 @@ class ViewChooser {
   void certify_end(const Task& task, ViewChoice& choice) const;
 
   GainModel gain_;
+  std::size_t unknown_ = 0;      ///< voxels that count, at the latest choice
+  bool made_room_only_ = false;  ///< the latest view chosen promised nothing but usable voxels
+  int in_vain_ = 0;              ///< such views in a row after which no more was known
   std::vector<GainWorker> workers_;
   std::vector<Candidate> candidates_;  ///< room for the certificate's samples
   std::vector<int> order_;

@@ -64,6 +64,7 @@ std::size_t GainModel::required_bytes(const GridGeometry& geometry, const GainSa
 void GainModel::prepare(const ViewContext& context) {
   ENSURE(4511, context.map.geometry() == geometry_);
   ENSURE(4512, context.zone.size() == geometry_.count());
+  unknown_ = 0;
   for (std::size_t i = 0; i < plane_.size(); ++i) {
     const bool counts = context.zone[i] != 0;
     const bool futile = futile_.count(i) >= sampling_.futile_max;
@@ -73,6 +74,7 @@ void GainModel::prepare(const ViewContext& context) {
         break;
       case VoxelClass::kUnknown:
         plane_[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight;
+        unknown_ += counts ? 1 : 0;
         break;
       case VoxelClass::kFree:
         plane_[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass;

@@ -14,7 +14,7 @@ namespace firstlook {
 struct GainSampling {
   int columns = 44;  ///< 1.3 degrees for a Kinect: a 5 cm voxel is met out to 2.2 m, and the reach zone ends before
   int rows = 33;
-  int futile_max = 3;  ///< looks without result after which a voxel is taken to be solid or to give no return
+  int futile_max = 2;  ///< looks without result after which a voxel is taken to be solid or to give no return
 };
 
 /// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark
@@ -65,6 +65,8 @@ class GainModel {
   [[nodiscard]] GainWorker worker() const { return {geometry_, rays_.ends_m.size()}; }
   /// Indices of unknown voxels of the zone that touch a free one and are not written off, ascending; from prepare().
   [[nodiscard]] std::span<const std::uint32_t> frontier() const { return frontier_; }
+  /// Unknown voxels of the zone; from prepare().
+  [[nodiscard]] std::size_t unknown() const { return unknown_; }
   [[nodiscard]] std::span<const std::uint8_t> plane() const { return plane_; }
 
  private:
@@ -79,6 +81,7 @@ class GainModel {
   GainRays rays_;
   double half_cone_rad_ = 0;  ///< the widest ray off the optical axis
   GainPlane plane_;
+  std::size_t unknown_ = 0;
   std::vector<std::uint32_t> frontier_;
   FutileLooks futile_;
 };

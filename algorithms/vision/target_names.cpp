@@ -116,7 +116,6 @@ TargetWords words_of(const BoardSpec& board) {
 std::string describe(const BoardSpec& board) {
   const TargetWords words = words_of(board);
   const double spacing_mm = board.square_size_m * 1e3, mark_mm = board.mark_size_m * 1e3;
-  std::string text = words.type;
   switch (board.type) {
     case TargetType::kCheckerboard:
       return fmt::format("checkerboard, {}x{} inner corners, squares of {:.4g} mm", words.columns, words.rows,

@@ -122,7 +122,9 @@ Result<GrayPixels> read_gray_image(const std::filesystem::path& file) {
   if (!stream) return failure(Fault::kDataMissing, "{}: cannot be opened", file.string());
   std::array<std::uint8_t, 8> start{};
   const std::size_t read = std::fread(start.data(), 1, start.size(), stream.get());
-  std::rewind(stream.get());
+  if (std::fseek(stream.get(), 0, SEEK_SET) != 0) {
+    return failure(Fault::kDataMissing, "{}: cannot be read from its start", file.string());
+  }
   try {
     if (read == start.size() && png_sig_cmp(start.data(), 0, start.size()) == 0) return read_png(file);
     if (read > 2 && start[0] == 0xFF && start[1] == 0xD8) return read_jpeg(file, stream.get());

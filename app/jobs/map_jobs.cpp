@@ -7,10 +7,6 @@
 #include "platform/journal/journal.hpp"
 
 namespace firstlook {
-namespace {
-constexpr double kSelfPadding_m = 0.02;  // the thesis's self filter
-}
-
 IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   IntegrateResult result;
   result.at_view = arguments.at_view;

@@ -84,6 +84,9 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       swept_log_odds_(geometry.count(), kUnknownLogOdds),
       published_(geometry, kFieldMax_m) {
   map_.set_safe_zone(zone_cylinder_);
+  for (const Capsule& capsule : arm_.body) {
+    if (capsule.link == 0) map_.note_fixed_body(capsule, kSelfPadding_m);
+  }
   for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});
   mapping_views_.reserve(kViewRecordsMax);
   observations_.reserve(static_cast<std::size_t>(config.calibration.views_max) + 1);
@@ -226,7 +229,8 @@ void Workbench::revoke_zone() {
   const double half_diagonal = 0.5 * std::sqrt(3.0) * g.resolution_m;
   for (std::size_t i = 0; i < free_mask_.size(); ++i) {
     const bool in_reach_of_zone = zone_cylinder_.depth_m(g.center_m(g.voxel_at(i))) > -half_diagonal;
-    const bool taken = in_reach_of_zone && (map_.zone_revoked(i) || map_.voxel_class(i) == VoxelClass::kOccupied);
+    const bool taken = in_reach_of_zone && !map_.is_fixed_body(i) &&
+                       (map_.zone_revoked(i) || map_.voxel_class(i) == VoxelClass::kOccupied);
     free_mask_[i] = taken ? 0 : 1;
     any_revoked_ = any_revoked_ || taken;
   }

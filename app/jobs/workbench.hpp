@@ -49,6 +49,9 @@ struct Observation {
   double residual_rms_px = 0;
 };
 
+/// Around the arm in depth images: the thesis's self filter.
+inline constexpr double kSelfPadding_m = 0.02;
+
 class Workbench {
  public:
   /// Takes all memory that the job needs. Errors: kMapTooLarge and kOutOfMemory with the numbers, kConfigBadValue.

@@ -89,7 +89,7 @@ AtomicFile::AtomicFile(AtomicFile&& other) noexcept
       temporary_(std::move(other.temporary_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
       buffer_(std::move(other.buffer_)),
-      status_(other.status_) {}
+      status_(std::move(other.status_)) {}
 
 AtomicFile::~AtomicFile() {
   if (descriptor_ < 0) return;

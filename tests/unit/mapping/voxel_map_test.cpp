@@ -159,6 +159,24 @@ TEST_CASE("after a stop nothing is known free until it is seen free again", "[ma
   CHECK_FALSE(m.map.known_free(0, 2, kMaxAge_s));
 }
 
+TEST_CASE("a hit on the bolted base leaves the safe zone as it is, one beside it does not", "[mapping][safety]") {
+  VoxelMap map(GridGeometry::covering({-1, -1, -0.5}, {1, 1, 1.5}, 0.05));
+  map.set_safe_zone({0.5, 1.15, -0.02});
+  map.note_fixed_body({.a = {0, 0, 0.05}, .b = {0, 0, 0.1}, .radius_m = 0.075, .link = 0}, 0.02);
+  const auto at = [&](double x, double y, double z) { return map.geometry().index(map.geometry().voxel({x, y, z})); };
+  const std::size_t base = at(0.076, 0.024, 0.024);
+  const std::size_t beside = at(0.151, 0.024, 0.024);
+  REQUIRE(map.is_fixed_body(base));
+  REQUIRE_FALSE(map.is_fixed_body(beside));
+  std::vector<std::uint64_t> none(VoxelMap::bit_words(map.geometry())), hit = none;
+  for (const std::size_t i : {base, beside}) hit[i / 64] |= 1ULL << (i % 64);
+  CHECK(map.apply(none, hit, pose_at(0), 1).zone_revoked == 1);
+  CHECK(map.in_intact_safe_zone(base));
+  CHECK_FALSE(map.in_intact_safe_zone(beside));
+  map.set(base, VoxelClass::kOccupied, 2);
+  CHECK(map.in_intact_safe_zone(base));
+}
+
 TEST_CASE("the safe zone holds whole voxels, and hits revoke them one by one", "[mapping][safety]") {
   VoxelMap map(GridGeometry::covering({-1, -1, -0.5}, {1, 1, 1.5}, 0.05));
   const SafeZone zone{0.5, 1.15, -0.02};

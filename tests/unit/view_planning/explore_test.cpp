@@ -120,13 +120,13 @@ TEST_CASE("one seed gives one choice, with one worker and with two", "[explore]"
 TEST_CASE("an arm with no room to move says that nothing can be reached", "[explore]") {
   SmallWorld world(Truth::room());
   ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1, 300);
-  // Free is only what lies within the clearance and a voxel's width around the posture it stands in.
+  // Free is only what lies within the clearance and less than a voxel's width around the posture it stands in.
   world.space.zone_intact = false;
   const Capsules placed = place(world.body.capsules, forward(world.arm, world.q));
   for (std::size_t i = 0; i < world.free.size(); ++i) {
     const Eigen::Vector3d p = world.map.geometry().center_m(world.map.geometry().voxel_at(i));
     world.free[i] = std::any_of(placed.begin(), placed.end(), [&](const Capsule& c) {
-      return segment_distance_m(p, p, c.a, c.b) < c.radius_m + world.clearance.voxels_m + 0.05;
+      return segment_distance_m(p, p, c.a, c.b) < c.radius_m + world.clearance.voxels_m + 0.035;
     });
   }
   world.field.rebuild(world.free);

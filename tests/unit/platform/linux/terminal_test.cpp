@@ -1,6 +1,7 @@
 #include "platform/linux/terminal.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <unistd.h>
 
@@ -11,10 +12,17 @@
 using namespace firstlook;
 
 namespace {
-std::string read_some(int descriptor) {
+/// What was written, until nothing more comes for a while: a terminal hands it on piece by piece.
+std::string read_all(int descriptor) {
+  std::string all;
   std::array<char, 4096> text{};
-  const ssize_t got = read(descriptor, text.data(), text.size());
-  return {text.data(), got > 0 ? static_cast<std::size_t>(got) : 0};
+  pollfd ready{.fd = descriptor, .events = POLLIN, .revents = 0};
+  while (poll(&ready, 1, all.empty() ? 10'000 : 300) > 0) {
+    const ssize_t got = read(descriptor, text.data(), text.size());
+    if (got <= 0) break;
+    all.append(text.data(), static_cast<std::size_t>(got));
+  }
+  return all;
 }
 }  // namespace
 
@@ -30,7 +38,7 @@ TEST_CASE("into a file or pipe go whole lines only, no progress, no control sequ
     Narrator quiet(ends[1], true);
     quiet.line("not to be seen");
   }
-  CHECK(read_some(ends[0]) == "sweep\n" + std::string(511, 'x') + "\n");
+  CHECK(read_all(ends[0]) == "sweep\n" + std::string(511, 'x') + "\n");
   CHECK_FALSE(color_wanted(ends[1]));
   close(ends[0]);
   close(ends[1]);
@@ -50,7 +58,7 @@ TEST_CASE("on a terminal the progress line is rewritten and gives way to lines t
     narrator.progress("2 %");
     narrator.line("done");
   }
-  CHECK(read_some(master) == "\r\x1b[K1 %\r\x1b[K2 %\r\x1b[Kdone\r\n");
+  CHECK(read_all(master) == "\r\x1b[K1 %\r\x1b[K2 %\r\x1b[Kdone\r\n");
   setenv("TERM", "xterm", 1);
   unsetenv("NO_COLOR");
   CHECK(color_wanted(terminal));
