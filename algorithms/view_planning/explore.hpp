@@ -20,7 +20,7 @@ struct ExploreOptions {
   int plans_max = 24;                       ///< candidates that the planner may try; twice as many for the certificate
   int plan_iterations_max = 400;            ///< for one of them
   std::span<const JointVector> trail = {};  ///< PlannerOptions::trail
-  int certificate_samples = 2000;           ///< random configurations, as many around the views taken, as many aimed
+  int certificate_samples = 1000;           ///< random configurations, as many around the views taken, as many aimed
   ViewTiming timing;
 };
 
@@ -60,9 +60,9 @@ class ViewChooser {
   /// @param workers_max     the highest worker number that run_parallel will pass, plus 1
   /// @param certificate_samples_max  upper limit of ExploreOptions::certificate_samples
   ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor, int candidates_max = 320, int workers_max = 2,
-              int certificate_samples_max = 2000, const GainSampling& sampling = {});
+              int certificate_samples_max = 1000, const GainSampling& sampling = {});
   [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, int candidates_max = 320,
-                                                  int workers_max = 2, int certificate_samples_max = 2000,
+                                                  int workers_max = 2, int certificate_samples_max = 1000,
                                                   const GainSampling& sampling = {});
 
   /// The view with the highest gain for each second that a certified path leads to; the same arguments give the same

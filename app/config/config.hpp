@@ -112,7 +112,7 @@ struct Config {
   struct Explore {
     int views_max = 150;
     int candidates = 400;
-    int certificate_samples = 2000;
+    int certificate_samples = 1000;
     int cluster_voxels_min = 8;
     double frames_while_moving_hz = 2;
     bool operator==(const Explore&) const = default;
