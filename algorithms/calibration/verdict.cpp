@@ -6,15 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 
 #include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/mistakes/placement_mistakes.hpp"
 #include "algorithms/calibration/unobservable.hpp"
 #include "algorithms/calibration/view_gate.hpp"
+#include "algorithms/calibration/view_subsets.hpp"
 #include "algorithms/vision/board_pose.hpp"
 #include "algorithms/vision/camera_model.hpp"
-#include "platform/core/random.hpp"
 
 namespace firstlook {
 namespace {
@@ -74,34 +73,20 @@ void hold_out(const Validation& validation, HandEyeResult& result) {
   if (validation.squared_px) result.holdout_rms_px = std::sqrt(squared_px / (2 * corners));
 }
 
-/// `count` of 0 .. n-1 without repetition, in ascending order.
-Indices random_subset(std::size_t n, std::size_t count, Random& random) {
-  Indices all(n);
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  for (std::size_t i = 0; i < count; ++i) {
-    std::swap(all[i], all[i + static_cast<std::size_t>(random.below(static_cast<int>(n - i)))]);
-  }
-  all.resize(count);
-  std::sort(all.begin(), all.end());
-  return all;
-}
-
 /// Returns how many of the solves failed.
 int spread_of_subsets(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
-  Random random(options.seed, 2201);
-  const std::size_t n = validation.pairs.size();
-  const auto share = static_cast<std::size_t>(std::ceil(options.subset_share * static_cast<double>(n)));
-  const std::size_t count = std::min(n, std::max<std::size_t>(3, share));
+  ViewSubsets subsets(validation.pairs.size(), options.subset_share, options.seed);
   double squared_m = 0, squared_rad = 0;
-  int solved = 0;
+  result.subset_solutions.clear();
   for (int i = 0; i < options.subset_solves; ++i) {
-    const auto subset = validation.resolve(random_subset(n, count, random));
+    const auto subset = validation.resolve(subsets.next());
     if (!subset) continue;
+    result.subset_solutions.push_back(subset->flange_T_camera);
     const Vector6d d = pose_difference(subset->flange_T_camera.pose(), result.flange_T_camera.pose());
     squared_m += d.head<3>().squaredNorm();
     squared_rad += d.tail<3>().squaredNorm();
-    ++solved;
   }
+  const auto solved = static_cast<int>(result.subset_solutions.size());
   if (solved > 0) {
     result.subset_spread_m = std::sqrt(squared_m / solved);
     result.subset_spread_rad = std::sqrt(squared_rad / solved);
@@ -332,6 +317,19 @@ void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, s
   validate(validation, options, result);
   const std::vector<PosePair> all = select_views(camera, board, views, {}, result.flange_T_camera).pairs;
   name_mistake(all, &board, [&] { return find_likely_mistake(camera, board, views); }, result);
+}
+
+std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const BoardSpec& board,
+                                 std::span<const CalibrationView> views, const HandEyeResult& result) {
+  return select_views(camera, board, views, result.fits, result.flange_T_camera).pairs;
+}
+
+std::vector<PosePair> used_pairs(std::span<const PosePair> pairs, const HandEyeResult& result) {
+  std::vector<PosePair> used;
+  for (std::size_t i = 0; i < pairs.size() && i < result.fits.size(); ++i) {
+    if (result.fits[i].used) used.push_back(pairs[i]);
+  }
+  return used;
 }
 
 Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,

@@ -54,6 +54,9 @@ struct HandEyeResult {
   double holdout_rms_m = 0;        ///< board centre as predicted by the others against as seen, RMS distance
   double subset_spread_m = 0;      ///< RMS over the solves of the distance of their translation from the whole's
   double subset_spread_rad = 0;
+  /// What those solves gave, in the order of the subsets (ViewSubsets) without those that failed; empty until
+  /// validated.
+  std::vector<Transform<Flange, Camera>> subset_solutions;
   double usable_distance_m = 0;
   double corner_sigma_px = 0;
   ArmSigma arm_sigma;
@@ -89,6 +92,11 @@ struct HandEyeResult {
                                                    const HandEyeOptions& options = {});
 void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result);
+
+/// The pose pairs that `result` was solved from, settled among the poses that each picture allows.
+[[nodiscard]] std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const BoardSpec& board,
+                                               std::span<const CalibrationView> views, const HandEyeResult& result);
+[[nodiscard]] std::vector<PosePair> used_pairs(std::span<const PosePair> pairs, const HandEyeResult& result);
 
 /// Which limits the covariance of a calibration exceeds by itself (sigmas, mapping distance, usable distance), each
 /// with its figure; empty when none. Part of the verdict, and all of it that holds for a calibration from elsewhere.

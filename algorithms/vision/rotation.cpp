@@ -39,4 +39,15 @@ Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& rotation_vector) {
   return Eigen::Matrix3d::Identity() + a * k + b * k * k;
 }
 
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& r) {
+  // A camera that looks along the tool has its camera_link at a pitch of 90 degrees, where yaw and roll are known only
+  // together: roll is taken from what is left after the yaw found, so that together they are right in any case.
+  const double horizontal = std::hypot(r(0, 0), r(1, 0));
+  const double pitch = std::atan2(-r(2, 0), horizontal);
+  const double yaw = horizontal < 1e-12 ? 0.0 : std::atan2(r(1, 0), r(0, 0));
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  const double roll = std::atan2(s * r(0, 2) - c * r(1, 2), c * r(1, 1) - s * r(0, 1));
+  return {roll, pitch, yaw};
+}
+
 }  // namespace firstlook

@@ -15,4 +15,7 @@ namespace firstlook {
 /// Left Jacobian of SO(3): Exp(phi + d) = Exp(J_l(phi) d) Exp(phi) to first order (Sola et al. 2018, eq. 145).
 [[nodiscard]] Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& rotation_vector);
 
+/// Roll, pitch and yaw (rad) of R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has them; yaw is 0 where it is not determined.
+[[nodiscard]] Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& rotation);
+
 }  // namespace firstlook

@@ -4,16 +4,22 @@
 #include <fmt/ranges.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
+#include "app/cli/small_commands.hpp"
 #include "app/dataset/calibration_dataset.hpp"
 #include "app/report/calibration_files.hpp"
+#include "app/report/dataset_report.hpp"
 #include "app/report/hand_eye_json.hpp"
+#include "app/report/result_json.hpp"
 #include "app/report/ros_files.hpp"
 #include "app/report/run_files.hpp"
+#include "platform/linux/process.hpp"
+#include "platform/linux/wakeup.hpp"
 
 namespace firstlook {
 namespace {
@@ -92,8 +98,15 @@ int fail_to_solve(const CalibrationDataset& data, const Error& error) {
   return kDataError;
 }
 
-Status write_files(const CalibrateCommandOptions& options, const CalibrationDataset& data, const HandEyeResult& result,
+/// The last part of a folder's name, whatever it ends with.
+std::string name_of_folder(const std::string& folder) {
+  const auto path = std::filesystem::path(folder).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
+Status write_files(const CalibrateCommandOptions& options, const CalibrationDataset& data, const RunRecord& record,
                    const HandEyeOptions& hand_eye) {
+  const HandEyeResult& result = *record.hand_eye;
   const std::string_view arm = options.arm.empty() ? kUnknownArm : std::string_view(options.arm);
   StoredCalibration calibration = stored_calibration(result, solver_name(hand_eye.solver), arm);
   if (data.source != CalibrationSource::kPairs) calibration.intrinsics = data.camera;
@@ -101,8 +114,10 @@ Status write_files(const CalibrateCommandOptions& options, const CalibrationData
   if (calibration.intrinsics.width > 0) {
     files.push_back({"camera_info.yaml", camera_info_yaml(calibration.intrinsics)});
   }
+  files.push_back({"report.html", dataset_report_html(record, data)});
+  files.push_back({"result.json", result_json(record)});
   if (Status written = write_named_files(options.out, files); !written) return written;
-  fmt::print(stderr, "{}: {}\n", options.out,
+  fmt::print(stderr, "{}: report.html, result.json, {}\n", options.out,
              calibration.accepted ? "hand_eye.yaml and what ROS loads, in ros/"
                                   : "hand_eye.yaml, which says that it is rejected; nothing for ROS is made of it");
   if (arm == kUnknownArm) fmt::print(stderr, "without --arm no job takes hand_eye.yaml up again\n");
@@ -112,6 +127,8 @@ Status write_files(const CalibrateCommandOptions& options, const CalibrationData
 }  // namespace
 
 int run_calibrate_command(const CalibrateCommandOptions& options) {
+  const std::string started = utc_date_text();
+  const std::int64_t start_ns = monotonic_ns();
   HandEyeOptions hand_eye;
   if (!options.solver.empty()) {
     const auto solver = find_solver(options.solver);
@@ -145,11 +162,20 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
                           : calibrate_hand_eye(data->camera, data->board, data->views, hand_eye);
   if (!result) return fail_to_solve(*data, result.error());
   narrate_views(*data, *result);
+  nlohmann::json hand_eye_object = hand_eye_json(*result, kFlangeFrame, solver_name(hand_eye.solver));
   if (!options.out.empty()) {
-    if (const Status s = write_files(options, *data, *result, hand_eye); !s) return fail(s.error(), kDataError);
+    RunRecord record = record_of_dataset(options.dataset, *data, *result, hand_eye);
+    record.cell = name_of_folder(options.dataset);
+    record.provenance.version = version_text();
+    record.wall.started = started;
+    record.wall.folder = options.out;
+    record.wall.total_s = static_cast<double>(monotonic_ns() - start_ns) * 1e-9;
+    record.wall.workers = 1;
+    if (const Status s = write_files(options, *data, record, hand_eye); !s) return fail(s.error(), kDataError);
+    hand_eye_object["solver_comparison"] = solver_comparison_json(*record.comparison);
   }
   if (options.json) {
-    fmt::print("{}\n", hand_eye_json(*result, kFlangeFrame, solver_name(hand_eye.solver)).dump(2));
+    fmt::print("{}\n", hand_eye_object.dump(2));
   } else {
     print_text(*result);
   }

@@ -11,12 +11,13 @@ struct CalibrateCommandOptions {
   bool strict = false;  ///< a rejected calibration is an error
   bool json = false;
   std::string detector = "default";  ///< find_detector_preset
-  std::string out = {};              ///< folder for hand_eye.yaml, camera_info.yaml and ros/; empty: no files
+  std::string out = {};              ///< folder for the files; empty: none
   std::string arm = {};              ///< find_arm_model; empty: not known, and no job takes hand_eye.yaml up
 };
 
 /// Prints the result on stdout (the hand_eye object of result.json when asked) and narrates on stderr; with `out`
-/// writes the files of calibration_files, and camera_info.yaml when a camera is known. The folder must be new or empty.
+/// writes report.html and result.json (with every solver on parts of the views), the files of calibration_files, and
+/// camera_info.yaml when a camera is known. The folder must be new or empty.
 /// @return the process's exit code: 0 solved, 2 usage, 3 data, 5 rejected and strict
 int run_calibrate_command(const CalibrateCommandOptions& options);
 

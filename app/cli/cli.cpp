@@ -80,8 +80,10 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->add_option("--detector", calibrate.detector,
                    "settings of the checkerboard's detection: default, thesis2014 (table D-8), ...")
       ->capture_default_str();
-  calibrate_app->add_option("--out", calibrate.out,
-                            "folder for hand_eye.yaml, camera_info.yaml and ros/; must be new or empty");
+  calibrate_app->add_option(
+      "--out", calibrate.out,
+      "folder for report.html, result.json, hand_eye.yaml, camera_info.yaml and ros/; must be new "
+      "or empty");
   calibrate_app
       ->add_option("--arm", calibrate.arm,
                    "the arm that the data are of, so that a later job may take up hand_eye.yaml: ur3, ur5, ur10, ur3e, "

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "algorithms/vision/rotation.hpp"
 #include "app/report/charts.hpp"
 #include "app/report/html.hpp"
 #include "app/report/picture_bytes.hpp"
@@ -122,11 +123,12 @@ std::string view_figure(const CalibrationViewRecord& view, std::size_t number, c
   const Eigen::Vector3d flange = view.base_T_flange.translation();
   return fmt::format(
       "<figure class=\"shot\" id=\"view{0}\"><a href=\"#view{0}\">\n{1}</a>"
-      "<figcaption><b>{0}</b> · {2}{3}<br><span>{4:.0f} s · flange at {5:.2f}, {6:.2f}, {7:.2f} m</span></figcaption>"
+      "<figcaption><b>{0}</b> · {2}{3}<br><span>{4} · flange at {5:.2f}, {6:.2f}, {7:.2f} m</span></figcaption>"
       "<a class=\"close\" href=\"#calibration-views\">close</a></figure>\n",
       number, corner_picture(view, picture),
       view.reprojected_px.empty() ? std::string("not solved") : fmt::format("{:.3f} px", view.rms_px),
-      what_became_of(view), view.time_s, flange.x(), flange.y(), flange.z());
+      what_became_of(view), view.name.empty() ? fmt::format("{:.0f} s", view.time_s) : escape_html(view.name),
+      flange.x(), flange.y(), flange.z());
 }
 
 }  // namespace
@@ -157,9 +159,12 @@ std::string calibration_views_section(const RunRecord& record) {
                           : "The solve grants each view a small deviation of the arm, so these figures are larger than "
                             "its own reprojection error. Held out is the same figure under a solve without this view. ";
   body += "Select a picture to enlarge it.</p>\n<div class=\"shots\">\n";
-  constexpr int kWidthMax = 640;  // about 25 kB each: the page stays below some 3 MB with 60 of them
-  for (std::size_t i = 0; i < views.size(); ++i) body += view_figure(views[i], i + 1, record.intrinsics, kWidthMax);
-  return section("calibration-views", "Views of the board", body + "</div>\n");
+  constexpr int kWidthMax = 640;  // about 25 kB each: the page stays below some 3 MB
+  const std::size_t shown = std::min(views.size(), kViewsShownMax);
+  for (std::size_t i = 0; i < shown; ++i) body += view_figure(views[i], i + 1, record.intrinsics, kWidthMax);
+  body += "</div>\n";
+  if (shown < views.size()) body += paragraph(fmt::format("The first {} of {} views are shown.", shown, views.size()));
+  return section("calibration-views", "Views of the board", body);
 }
 
 }  // namespace firstlook

@@ -8,24 +8,15 @@
 #include <iterator>
 
 #include "app/report/html.hpp"
+#include "app/report/svg.hpp"
 
 namespace firstlook {
 namespace {
 
-// Colours that remain apart with the common kinds of colour blindness (Okabe and Ito 2008).
-constexpr std::string_view kBlue = "#0072b2", kOrange = "#d55e00", kGreen = "#009e73", kGrey = "#6b7280";
+using svg::kBlue, svg::kGreen, svg::kGrey, svg::kOrange;
+using svg::line, svg::nice_step, svg::text_at;
 
 constexpr double kPhaseShown_s = 0.05;
-
-/// 1, 2 or 5 times a power of ten: about `count` steps up to `top`.
-double nice_step(double top, int count) {
-  const double raw = std::max(top, 1e-12) / count;
-  const double power = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (raw <= factor * power * 1.0001) return factor * power;
-  }
-  return 10 * power;
-}
 
 /// Places of a drawing area inside an SVG and the value ranges that it shows.
 struct Plot {
@@ -36,21 +27,6 @@ struct Plot {
   [[nodiscard]] double bottom() const { return top + height; }
   [[nodiscard]] double right() const { return left + width; }
 };
-
-std::string svg_open(double width, double height, std::string_view label) {
-  return fmt::format("<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", width, height,
-                     label);
-}
-
-std::string text_at(double x, double y, std::string_view anchor, std::string_view text, std::string_view style = "") {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}{}>{}</text>\n", x, y, anchor,
-                     style.empty() ? "" : " ", style, escape_html(text));
-}
-
-std::string line(double x1, double y1, double x2, double y2, std::string_view name) {
-  return fmt::format("<line class=\"{}\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n", name, x1, y1, x2,
-                     y2);
-}
 
 std::string axis_y(const Plot& plot, double step, auto&& label) {
   std::string svg;
@@ -113,7 +89,7 @@ std::string voxel_chart(std::span<const MappingViewRecord> views) {
   const double views_shown = std::max(2.0, static_cast<double>(views.size()));
   const Plot plot{62, 26, 560, 260, 1, views_shown, step * std::ceil(static_cast<double>(top) / step)};
 
-  std::string svg = svg_open(760, 330, "Voxels unknown, free and occupied against the number of views");
+  std::string svg = svg::open(760, 330, "Voxels unknown, free and occupied against the number of views");
   svg += axis_y(plot, step, thousands);
   const int view_step = std::max(1, static_cast<int>(nice_step(views_shown, 10)));
   for (int i = view_step == 1 ? 1 : view_step; i <= static_cast<int>(views_shown); i += view_step) {
@@ -151,7 +127,7 @@ std::string view_rms_chart(std::span<const CalibrationViewRecord> views) {
   const double step = nice_step(top, 4);
   const Plot plot{
       48, 26, 430, 200, 0.5, static_cast<double>(views.size()) + 0.5, step * std::ceil(top / step * 0.9999)};
-  std::string svg = svg_open(490, 270, "Reprojection error of each calibration view");
+  std::string svg = svg::open(490, 270, "Reprojection error of each calibration view");
   svg += axis_y(plot, step, [](double v) { return fmt::format("{:.3g}", v); });
   const double slot = plot.width / static_cast<double>(views.size());
   const auto bar = [&](double x, double width, double value, std::string_view colour) {
@@ -196,7 +172,7 @@ std::string residual_chart(std::span<const CalibrationViewRecord> views) {
   const double ring = nice_step(reach, 3);
   const double limit = ring * std::ceil(reach / ring * 0.9999);
   constexpr double kCentre = 130, kRadius = 104;
-  std::string svg = svg_open(300, 270, "Reprojection error of every corner");
+  std::string svg = svg::open(300, 270, "Reprojection error of every corner");
   for (double r = ring; r <= limit * 1.0001; r += ring) {
     svg += fmt::format("<circle class=\"ring\" cx=\"{}\" cy=\"{}\" r=\"{:.1f}\"/>\n", kCentre, kCentre,
                        r / limit * kRadius);
@@ -231,7 +207,7 @@ std::string phase_chart(std::span<const PhaseRecord> all_phases) {
   const double step = nice_step(std::max(end - begin, 1e-3), 8);
   const double row = 24;
   const Plot plot{120, 10, 560, row * static_cast<double>(phases.size()), begin, std::max(end, begin + 1e-3), 1};
-  std::string svg = svg_open(760, plot.bottom() + 30, "Phases of the job over time");
+  std::string svg = svg::open(760, plot.bottom() + 30, "Phases of the job over time");
   for (double t = step * std::ceil(begin / step); t <= end + 1e-9; t += step) {
     svg += line(plot.x(t), plot.top, plot.x(t), plot.bottom(), "grid");
     svg += text_at(plot.x(t), plot.bottom() + 18, "middle", fmt::format("{:g} s", t));
@@ -257,7 +233,7 @@ std::string memory_chart(const MemoryRecord& memory) {
   for (const PoolRecord& pool : rows) top = std::max({top, pool.reserved_bytes, pool.peak_bytes});
   const double row = 24;
   const Plot plot{190, 6, 340, row * static_cast<double>(rows.size()), 0, static_cast<double>(top), 1};
-  std::string svg = svg_open(760, plot.bottom() + 10, "Memory reserved and used");
+  std::string svg = svg::open(760, plot.bottom() + 10, "Memory reserved and used");
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const PoolRecord& pool = rows[i];
     const double y = plot.top + row * static_cast<double>(i);

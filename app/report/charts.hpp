@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/report/run_record.hpp"
@@ -24,6 +25,11 @@ namespace firstlook {
 
 /// The peak of each pool inside what it reserves, and all of them inside the budget; declared rows in grey.
 [[nodiscard]] std::string memory_chart(const MemoryRecord& memory);
+
+/// The boxes of some figures of every solver's transforms (thesis, figures 8-2 and 8-3), one panel for each figure,
+/// side by side. What lies far from where most solvers are stands as an arrow on the panel's rim.
+[[nodiscard]] std::string solver_box_chart(const SolverComparison& comparison, std::span<const PoseFigure> figures,
+                                           std::string_view label);
 
 /// A calibration picture with detected (rings) and reprojected (crosses) corners. `jpeg_base64` may be empty: then the
 /// corners stand on a plain ground. Sizes in px of the camera's frame; `picture_*` is the part that the picture covers.

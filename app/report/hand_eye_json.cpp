@@ -1,5 +1,6 @@
 #include "app/report/hand_eye_json.hpp"
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -98,6 +99,28 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
   residual["consecutive"] = residual_json(result.ax_xb_consecutive);
   object["ax_xb_residual"] = residual;
   return object;
+}
+
+json solver_comparison_json(const SolverComparison& comparison) {
+  constexpr std::array<const char*, kPoseFigures> kKeys = {"x_m",     "y_m", "z_m", "roll_rad", "pitch_rad",
+                                                           "yaw_rad", "qx",  "qy",  "qz",       "qw"};
+  json solvers = json::array();
+  for (const SubsetSolves& s : comparison.solvers) {
+    json row = {{"solver", s.solver},
+                {"solved", s.solved},
+                {"failed", s.failed},
+                {"first_failure", s.first_failure.empty() ? json(nullptr) : json(s.first_failure)}};
+    for (std::size_t i = 0; i < kPoseFigures; ++i) {
+      const BoxFigures& b = s.boxes[i];
+      row[kKeys[i]] = s.solved > 0 ? json{b.minimum, b.quartile_low, b.median, b.quartile_high, b.maximum} : json();
+    }
+    solvers.push_back(std::move(row));
+  }
+  return {{"views", comparison.views},
+          {"views_of_solve", comparison.views_of_solve},
+          {"subsets", comparison.subsets},
+          {"refined_subsets", comparison.refined_subsets},
+          {"solvers", std::move(solvers)}};
 }
 
 void describe_stored(const VerifiedCalibration& verified, json& hand_eye) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string_view>
 
+#include "algorithms/calibration/solver_comparison.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "app/report/run_record.hpp"
 
@@ -16,6 +17,10 @@ namespace firstlook {
 /// SI units unless the name says otherwise; numbers that do not apply (no corners) are null.
 [[nodiscard]] nlohmann::json hand_eye_json(const HandEyeResult& result, std::string_view parent_link,
                                            std::string_view solver);
+
+/// Every solver on the same random parts of the views: for each its name, how many were solved, why the first was not,
+/// and for each figure minimum, lower quartile, median, upper quartile and maximum (null when none was solved).
+[[nodiscard]] nlohmann::json solver_comparison_json(const SolverComparison& comparison);
 
 /// Says of a hand_eye object that it came from an earlier job (source: stored), and how its test went (verification).
 /// What only a solve of this job could tell becomes null.

@@ -39,6 +39,8 @@ class HtmlTable {
 [[nodiscard]] std::string mib_text(std::uint64_t bytes);
 /// A section with its heading; `id` is an anchor.
 [[nodiscard]] std::string section(std::string_view id, std::string_view title, const std::string& body);
+/// All of a page before its body. @param title  escaped already
+[[nodiscard]] std::string page_head(const std::string& title);
 /// A paragraph of escaped text.
 [[nodiscard]] std::string paragraph(std::string_view text);
 

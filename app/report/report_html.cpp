@@ -3,23 +3,10 @@
 #include <fmt/format.h>
 
 #include "app/report/html.hpp"
-#include "app/report/report_style.hpp"
 #include "app/report/sections.hpp"
 
 namespace firstlook {
 namespace {
-
-std::string head(const std::string& title) {
-  // The policy keeps the promise of the page: nothing is fetched and no script runs, whatever the data say.
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
-      "'unsafe-inline'\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-      title + "</title>\n<style>";
-  html += kReportStyle;
-  return html + "</style>\n</head>\n";
-}
 
 std::string navigation(const RunRecord& record) {
   std::string html = "<nav>";
@@ -44,7 +31,7 @@ std::string navigation(const RunRecord& record) {
 
 std::string report_html(const RunRecord& record) {
   const std::string title = fmt::format("firstlook report: {}, seed {}", escape_html(record.cell), record.seed);
-  std::string html = head(title);
+  std::string html = page_head(title);
   html += fmt::format(
       "<body>\n<main>\n<header><h1>Cell {}, seed {}</h1><span class=\"brand\">firstlook {} · report</span></header>\n",
       escape_html(record.cell), record.seed, escape_html(record.provenance.version));

@@ -109,6 +109,9 @@ std::string result_json(const RunRecord& record) {
     describe_stored(*record.verified, hand_eye);
     json["hand_eye"] = hand_eye;
   }
+  if (record.hand_eye && record.comparison) {
+    json["hand_eye"]["solver_comparison"] = solver_comparison_json(*record.comparison);
+  }
   json["mapping"] = record.mapping ? mapping_json(*record.mapping) : Json(nullptr);
   json["safety"] = record.safety ? safety_json(*record.safety) : Json(nullptr);
   json["memory"] = record.memory ? memory_json(*record.memory) : Json(nullptr);

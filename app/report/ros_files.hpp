@@ -41,7 +41,4 @@ struct NamedFile {
 /// camera_info.yaml as camera_calibration_parsers reads and writes it: plumb_bob, no rectification.
 [[nodiscard]] std::string camera_info_yaml(const CameraIntrinsics& camera);
 
-/// Roll, pitch and yaw (rad) of R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has them; yaw is 0 where it is not determined.
-[[nodiscard]] Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& rotation);
-
 }  // namespace firstlook

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/calibration/solver_comparison.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/verification.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
@@ -74,6 +75,7 @@ struct PhaseRecord {
 
 /// One view of the board that took part in the calibration, in the order taken.
 struct CalibrationViewRecord {
+  std::string name;  ///< of recorded data: its image; empty in a run
   double time_s = 0;
   JointVector joints_rad;
   Transform<Base, Flange> base_T_flange;
@@ -229,6 +231,7 @@ struct RunRecord {
   std::optional<HandEyeResult> hand_eye;
   std::optional<VerifiedCalibration> verified;  ///< where hand_eye came from, when not solved in this run
   std::string solver;                           ///< closed form that started it
+  std::optional<SolverComparison> comparison;   ///< of recorded data alone
   CameraIntrinsics intrinsics;                  ///< of the colour camera; width 0: unknown, no camera_info.yaml
   Transform<Camera, Depth> camera_T_depth;
   std::vector<CalibrationViewRecord> calibration_views;

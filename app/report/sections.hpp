@@ -8,10 +8,14 @@
 
 namespace firstlook {
 
+/// Views of the board that a page shows as figures; the charts have all of them.
+inline constexpr std::size_t kViewsShownMax = 60;
+
 [[nodiscard]] std::string summary_section(const RunRecord& record);     ///< verdict, key figures, time line
 [[nodiscard]] std::string verification_table(const RunRecord& record);  ///< in place of the quality of a solve
 [[nodiscard]] std::string hand_eye_section(const RunRecord& record);
 [[nodiscard]] std::string calibration_views_section(const RunRecord& record);
+[[nodiscard]] std::string solver_comparison_section(const RunRecord& record);
 [[nodiscard]] std::string map_section(const RunRecord& record);
 [[nodiscard]] std::string mapping_views_section(const RunRecord& record);
 [[nodiscard]] std::string remaining_section(const RunRecord& record);
