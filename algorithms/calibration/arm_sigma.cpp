@@ -14,17 +14,19 @@ Vector6d prior_diagonal(const ArmSigma& sigma) {
   return p;
 }
 
-/// One view with its deviation eliminated (Schur complement).
+/// One station with its deviation eliminated (Schur complement).
+template <int N>
 struct Eliminated {
   Matrix6d arm_inverse;
-  Matrix12x6d gain;  ///< global_arm * arm_inverse
+  Eigen::Matrix<double, N, 6> gain;  ///< global_arm * arm_inverse
   Vector6d right;
 };
 
-Eliminated eliminate(const ViewNormal& view, const Vector6d& deviation, const Vector6d& prior) {
+template <typename Normal>
+Eliminated<Normal::kGlobal> eliminate(const Normal& view, const Vector6d& deviation, const Vector6d& prior) {
   Matrix6d arm = view.arm;
   arm.diagonal() += prior;
-  Eliminated e;
+  Eliminated<Normal::kGlobal> e;
   e.arm_inverse = arm.llt().solve(Matrix6d::Identity());
   e.gain = view.global_arm * e.arm_inverse;
   e.right = view.arm_right - prior.cwiseProduct(deviation);
@@ -32,50 +34,89 @@ Eliminated eliminate(const ViewNormal& view, const Vector6d& deviation, const Ve
 }
 
 /// Inverse of a positive definite matrix whose rows have different units; empty when it is singular to rounding.
-std::optional<Matrix12d> inverse(const Matrix12d& m) {
-  const Vector12d diagonal = m.diagonal();
+template <int N>
+std::optional<Eigen::Matrix<double, N, N>> inverse(const Eigen::Matrix<double, N, N>& m) {
+  using Matrix = Eigen::Matrix<double, N, N>;
+  using Vector = Eigen::Matrix<double, N, 1>;
+  const Vector diagonal = m.diagonal();
   if (!m.allFinite() || !(diagonal.minCoeff() > 0)) return std::nullopt;
-  const Vector12d scale = diagonal.cwiseSqrt().cwiseInverse();
-  const Matrix12d scaled = scale.asDiagonal() * m * scale.asDiagonal();
-  const Eigen::LDLT<Matrix12d> ldlt(scaled);
+  const Vector scale = diagonal.cwiseSqrt().cwiseInverse();
+  const Matrix scaled = scale.asDiagonal() * m * scale.asDiagonal();
+  const Eigen::LDLT<Matrix> ldlt(scaled);
   if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-14)) return std::nullopt;
-  const Matrix12d scaled_inverse = ldlt.solve(Matrix12d::Identity());
-  const Matrix12d result = scale.asDiagonal() * scaled_inverse * scale.asDiagonal();
-  return Matrix12d((result + result.transpose()) / 2);
+  const Matrix scaled_inverse = ldlt.solve(Matrix::Identity(m.rows(), m.rows()));
+  const Matrix result = scale.asDiagonal() * scaled_inverse * scale.asDiagonal();
+  return Matrix((result + result.transpose()) / 2);
 }
 
-}  // namespace
-
-std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
-                                           const ArmSigma& sigma) {
+/// The same for one board, where sizes are fixed, and for several.
+template <typename Normal>
+std::optional<LinearSolution> solve_normals(std::span<const Normal> views, std::span<const Vector6d> deviations,
+                                            const ArmSigma& sigma) {
+  constexpr int kGlobal = Normal::kGlobal;
+  using Matrix = Eigen::Matrix<double, kGlobal, kGlobal>;
+  using Vector = Eigen::Matrix<double, kGlobal, 1>;
+  if (views.empty()) return std::nullopt;
+  const Eigen::Index size = views.front().global.rows();
   const Vector6d prior = prior_diagonal(sigma);
-  std::vector<Eliminated> eliminated;
-  Matrix12d schur = Matrix12d::Zero();
-  Vector12d right = Vector12d::Zero();
+  std::vector<Eliminated<kGlobal>> eliminated;
+  Matrix schur = Matrix::Zero(size, size);
+  Vector right = Vector::Zero(size);
   for (std::size_t i = 0; i < views.size(); ++i) {
     eliminated.push_back(eliminate(views[i], deviations[i], prior));
-    const Eliminated& e = eliminated.back();
+    const Eliminated<kGlobal>& e = eliminated.back();
     schur += views[i].global - e.gain * views[i].global_arm.transpose();
     right += views[i].global_right - e.gain * e.right;
   }
-  const auto covariance = inverse(schur);
+  const auto covariance = inverse<kGlobal>(schur);
   if (!covariance) return std::nullopt;
 
   LinearSolution solution;
   solution.covariance = *covariance;
-  const Vector12d step = *covariance * right;
+  const Vector step = *covariance * right;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const Eliminated& e = eliminated[i];
+    const Eliminated<kGlobal>& e = eliminated[i];
     const Vector6d own = e.arm_inverse * (e.right - views[i].global_arm.transpose() * step);
     solution.deviations.push_back(deviations[i] + own);
     const Matrix6d spread = e.arm_inverse + e.gain.transpose() * *covariance * e.gain;
     solution.deviation_covariance.push_back(spread);
-    const Matrix12x6d cross = -*covariance * e.gain;
+    const Eigen::Matrix<double, kGlobal, 6> cross = -*covariance * e.gain;
     solution.effective_parameters += (views[i].global * *covariance).trace() +
                                      2 * (views[i].global_arm.transpose() * cross).trace() +
                                      (views[i].arm * spread).trace();
   }
   return solution;
+}
+
+}  // namespace
+
+StationNormal::StationNormal(int boards)
+    : global(Eigen::MatrixXd::Zero(6 + 6 * boards, 6 + 6 * boards)),
+      global_arm(Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(6 + 6 * boards, 6)),
+      global_right(Eigen::VectorXd::Zero(6 + 6 * boards)) {}
+
+void StationNormal::add(const ViewNormal& view, std::size_t board) {
+  const Eigen::Index own = 6 + 6 * static_cast<Eigen::Index>(board);
+  global.topLeftCorner<6, 6>() += view.global.topLeftCorner<6, 6>();
+  global.block<6, 6>(0, own) += view.global.topRightCorner<6, 6>();
+  global.block<6, 6>(own, 0) += view.global.bottomLeftCorner<6, 6>();
+  global.block<6, 6>(own, own) += view.global.bottomRightCorner<6, 6>();
+  global_arm.topRows<6>() += view.global_arm.topRows<6>();
+  global_arm.middleRows<6>(own) += view.global_arm.bottomRows<6>();
+  global_right.head<6>() += view.global_right.head<6>();
+  global_right.segment<6>(own) += view.global_right.tail<6>();
+  arm += view.arm;
+  arm_right += view.arm_right;
+}
+
+std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
+                                           const ArmSigma& sigma) {
+  return solve_normals(views, deviations, sigma);
+}
+
+std::optional<LinearSolution> solve_linear(std::span<const StationNormal> stations,
+                                           std::span<const Vector6d> deviations, const ArmSigma& sigma) {
+  return solve_normals(stations, deviations, sigma);
 }
 
 namespace {
@@ -132,10 +173,9 @@ class Accelerated {
   bool extrapolated_ = false;
 };
 
-}  // namespace
-
-std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
-                                           ArmSigma start, const RefinementOptions& options) {
+template <typename Normal>
+std::optional<ArmSigma> estimate_sigma(std::span<const Normal> views, std::span<const Vector6d> deviations,
+                                       ArmSigma start, const RefinementOptions& options) {
   constexpr int kIterationsMax = 300;  // a step is about 50 us for 25 views
   constexpr double kChangeMin = 2e-5;
   Accelerated translation, rotation;
@@ -152,6 +192,19 @@ std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, st
                                   std::exp(rotation.next(std::log(start.rotation_rad), rotation_step)));
   }
   return start;
+}
+
+}  // namespace
+
+std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
+                                           ArmSigma start, const RefinementOptions& options) {
+  return estimate_sigma(views, deviations, start, options);
+}
+
+std::optional<ArmSigma> estimate_arm_sigma(std::span<const StationNormal> stations,
+                                           std::span<const Vector6d> deviations, ArmSigma start,
+                                           const RefinementOptions& options) {
+  return estimate_sigma(stations, deviations, start, options);
 }
 
 }  // namespace firstlook

@@ -10,23 +10,44 @@
 
 namespace firstlook {
 
+/// Normal equations of one place of the arm over hand-eye and several boards = "global", and the arm's deviation there;
+/// the views that were taken from it added up.
+struct StationNormal {
+  static constexpr int kGlobal = Eigen::Dynamic;
+  Eigen::MatrixXd global;  ///< 6 rows for the hand-eye, then 6 for each board
+  Eigen::Matrix<double, Eigen::Dynamic, 6> global_arm;
+  Matrix6d arm = Matrix6d::Zero();
+  Eigen::VectorXd global_right;
+  Vector6d arm_right = Vector6d::Zero();
+
+  explicit StationNormal(int boards);
+  /// @param board  which one the view shows
+  void add(const ViewNormal& view, std::size_t board);
+};
+
 /// Solution of the linearised problem for given sigmas.
 struct LinearSolution {
-  Matrix12d covariance = Matrix12d::Zero();    ///< of (hand-eye, board), deviations marginalised
-  std::vector<Matrix6d> deviation_covariance;  ///< one for each view
+  Eigen::MatrixXd covariance;                  ///< of (hand-eye, boards), deviations marginalised
+  std::vector<Matrix6d> deviation_covariance;  ///< one for each station
   std::vector<Vector6d> deviations;            ///< in total, not the step
   double effective_parameters = 0;             ///< trace of the hat matrix over the corner residuals
 };
 
 /// Solves the normal equations of all views (weights: 1 / corner variance) with a Gaussian prior of `sigma` on the arm
 /// deviations, which stand at `deviations` where the views are linearised. Empty when they are singular.
+/// One board and a station for each view, or several boards.
 [[nodiscard]] std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views,
+                                                         std::span<const Vector6d> deviations, const ArmSigma& sigma);
+[[nodiscard]] std::optional<LinearSolution> solve_linear(std::span<const StationNormal> stations,
                                                          std::span<const Vector6d> deviations, const ArmSigma& sigma);
 
 /// Expectation maximisation (Dempster, Laird and Rubin 1977) over the linearised problem: the expected squares of the
 /// deviations give the next sigmas. Sigmas that `options` states stay; none falls below its lower bound. Empty when the
 /// normal equations are singular.
 [[nodiscard]] std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views,
+                                                         std::span<const Vector6d> deviations, ArmSigma start,
+                                                         const RefinementOptions& options);
+[[nodiscard]] std::optional<ArmSigma> estimate_arm_sigma(std::span<const StationNormal> stations,
                                                          std::span<const Vector6d> deviations, ArmSigma start,
                                                          const RefinementOptions& options);
 

@@ -115,7 +115,7 @@ OpenView seen_one_way(const CalibrationView& view, const BoardPose& pose) {
   const double coordinates = 2.0 * static_cast<double>(view.corners_px.size());
   const double variance = std::max(kSigmaMin_px * kSigmaMin_px,
                                    std::pow(pose.residual_rms_px, 2) * coordinates / std::max(2.0, coordinates - 6));
-  OpenView open{view.base_T_flange, {{pose.camera_T_board, false, false}}};
+  OpenView open{view.base_T_flange, {{pose.camera_T_board, false, false}}, view.target};
   if (!pose.other) return open;
   const double worse = std::pow(pose.other->residual_rms_px, 2) - std::pow(pose.residual_rms_px, 2);
   if (worse * coordinates < 2 * kDoubt * variance) open.choices.push_back({pose.other->camera_T_board, false, true});
@@ -131,7 +131,10 @@ OpenView open_view(const BoardSpec& board, const CalibrationView& view, const Bo
   return open;
 }
 
-Indices settle_choices(std::span<const OpenView> views) {
+namespace {
+
+/// settle_choices for the views of one target.
+Indices settle_one(std::span<const OpenView> views) {
   constexpr int kTrials = 40;
   Agreement best{Indices(views.size(), 0), std::numeric_limits<double>::infinity()};
   if (views.size() < 4 || !any_open(views)) return best.choices;
@@ -152,7 +155,8 @@ Indices settle_choices(std::span<const OpenView> views) {
   return best.choices;
 }
 
-Indices settle_choices(std::span<const OpenView> views, const Transform<Flange, Camera>& flange_T_camera) {
+/// settle_choices for the views of one target.
+Indices settle_one(std::span<const OpenView> views, const Transform<Flange, Camera>& flange_T_camera) {
   constexpr std::size_t kAsked = 20;  // views whose poses are tried as the board's place
   Agreement best{Indices(views.size(), 0), std::numeric_limits<double>::infinity()};
   if (views.size() < 2 || !any_open(views)) return best.choices;
@@ -165,6 +169,67 @@ Indices settle_choices(std::span<const OpenView> views, const Transform<Flange, 
   }
   keep_first_as_seen(views, best.choices);
   return best.choices;
+}
+
+/// Numbers of the views of each target that is seen.
+std::vector<Indices> views_by_target(std::span<const OpenView> views) {
+  std::vector<Indices> groups;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto same = [&](const Indices& group) { return views[group.front()].target == views[i].target; };
+    const auto group = std::find_if(groups.begin(), groups.end(), same);
+    if (group == groups.end()) {
+      groups.push_back({i});
+    } else {
+      group->push_back(i);
+    }
+  }
+  return groups;
+}
+
+std::vector<OpenView> some_of(std::span<const OpenView> views, const Indices& group) {
+  std::vector<OpenView> some;
+  for (const std::size_t i : group) some.push_back(views[i]);
+  return some;
+}
+
+void put_back(const Indices& own, const Indices& group, Indices& choices) {
+  for (std::size_t k = 0; k < group.size(); ++k) choices[group[k]] = own[k];
+}
+
+}  // namespace
+
+Indices settle_choices(std::span<const OpenView> views) {
+  const std::vector<Indices> groups = views_by_target(views);
+  if (groups.size() < 2) return settle_one(views);
+  constexpr std::size_t kSettledBySelf = 4;
+  Indices choices(views.size(), 0);
+  std::vector<PosePair> sure;
+  for (const Indices& group : groups) {
+    const std::vector<OpenView> own = some_of(views, group);
+    put_back(settle_one(own), group, choices);
+    if (own.size() < kSettledBySelf && any_open(own)) continue;
+    for (const std::size_t i : group) {
+      sure.push_back(chosen(views[i], choices[i]));
+      sure.back().target = views[i].target;
+    }
+  }
+  const auto hand_eye = solve_closed_form(sure);
+  if (!hand_eye) return choices;
+  for (const Indices& group : groups) {
+    const std::vector<OpenView> own = some_of(views, group);
+    if (own.size() < kSettledBySelf && any_open(own)) put_back(settle_one(own, *hand_eye), group, choices);
+  }
+  return choices;
+}
+
+Indices settle_choices(std::span<const OpenView> views, const Transform<Flange, Camera>& flange_T_camera) {
+  const std::vector<Indices> groups = views_by_target(views);
+  if (groups.size() < 2) return settle_one(views, flange_T_camera);
+  Indices choices(views.size(), 0);
+  for (const Indices& group : groups) {
+    put_back(settle_one(some_of(views, group), flange_T_camera), group, choices);
+  }
+  return choices;
 }
 
 void adopt_choice(const BoardSpec& board, const PoseChoice& choice, BoardPose& pose) {

@@ -22,6 +22,7 @@ struct PoseChoice {
 struct OpenView {
   Transform<Base, Flange> base_T_flange;
   std::vector<PoseChoice> choices;
+  int target = 0;  ///< as in CalibrationView
 };
 
 /// The board's frame turned by 180 degrees about the board's middle: what reversing the points does to a pose.
@@ -36,7 +37,8 @@ struct OpenView {
 
 /// Index of the true choice of each view: under random fours of views in closed form, with each combination of their
 /// choices, the one under which all views agree best on the board's place. The first view is not reversed. All 0 with
-/// fewer than four views or when nothing can be told. 3 to 7 ms for 4 to 30 views of two choices each.
+/// fewer than four views or when nothing can be told. Several targets are settled one by one; one with fewer views than
+/// that under the hand-eye transform that the others give. 3 to 7 ms for 4 to 30 views of two choices each.
 [[nodiscard]] std::vector<std::size_t> settle_choices(std::span<const OpenView> views);
 
 /// The same with a known hand-eye transform, from two views on.

@@ -15,7 +15,7 @@ using Parameters = std::array<double, 6>;
 
 struct Shared {
   const CameraIntrinsics& camera;
-  const BoardSpec& board;
+  std::span<const BoardSpec> boards;
   const BundleState& reference;
   const BundleNoise& noise;
 };
@@ -40,12 +40,13 @@ class ReprojectionCost final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const std::array<Vector6d, 3> at = {as_vector(parameters[0]), as_vector(parameters[1]), as_vector(parameters[2])};
     const ViewGeometry geometry{perturb(shared_.reference.flange_T_camera, at[0]),
-                                perturb(shared_.reference.base_T_board, at[1]),
+                                perturb(shared_.reference.base_T_board[view_.board], at[1]),
                                 perturb(view_.base_T_flange_said, at[2])};
     const std::array<Matrix6d, 3> inner = {parameter_jacobian(at[0]), parameter_jacobian(at[1]),
                                            parameter_jacobian(at[2])};
+    const BoardSpec& board = shared_.boards[view_.board];
     for (std::size_t i = 0; i < view_.points.size(); ++i) {
-      const auto term = corner_term(shared_.camera, geometry, shared_.board.corner(view_.points.point(i)));
+      const auto term = corner_term(shared_.camera, geometry, board.corner(view_.points.point(i)));
       if (!term) return false;
       const double scale = std::sqrt(view_.weights[i]) / shared_.noise.corner_sigma_px;
       Eigen::Map<Eigen::Vector2d>(residuals + 2 * i) = scale * (term->pixel - view_.points.corners_px[i]);
@@ -96,39 +97,46 @@ ceres::Solver::Options solver_options(int iterations_max) {
 }
 
 Status run_ceres(const Shared& shared, std::span<const BundleView> views, int iterations_max, BundleState& result) {
-  Parameters hand_eye{}, board{};
-  std::vector<Parameters> arm(views.size());
+  // Ceres goes through the blocks of a group by their addresses: one array gives them an order of ours.
+  std::vector<Parameters> poses(1 + shared.boards.size()), arm(shared.reference.deviations.size());
+  Parameters& hand_eye = poses.front();
+  const std::span<Parameters> boards = std::span(poses).subspan(1);
   ceres::Problem problem;
   auto options = solver_options(iterations_max);
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (std::size_t i = 0; i < views.size(); ++i) {
-    Eigen::Map<Vector6d>(arm[i].data()) = shared.reference.deviations[i];
-    problem.AddResidualBlock(new ReprojectionCost(shared, views[i]), nullptr, hand_eye.data(), board.data(),
-                             arm[i].data());
-    problem.AddResidualBlock(new ArmPrior(shared.noise.arm_sigma), nullptr, arm[i].data());
-    options.linear_solver_ordering->AddElementToGroup(arm[i].data(), 0);
+    double* const deviation = arm[views[i].station].data();
+    const bool first = !problem.HasParameterBlock(deviation);
+    if (first) Eigen::Map<Vector6d>{deviation} = shared.reference.deviations[views[i].station];
+    problem.AddResidualBlock(new ReprojectionCost(shared, views[i]), nullptr, hand_eye.data(),
+                             boards[views[i].board].data(), deviation);
+    if (!first) continue;
+    problem.AddResidualBlock(new ArmPrior(shared.noise.arm_sigma), nullptr, deviation);
+    options.linear_solver_ordering->AddElementToGroup(deviation, 0);
   }
-  options.linear_solver_ordering->AddElementToGroup(hand_eye.data(), 1);
-  options.linear_solver_ordering->AddElementToGroup(board.data(), 1);
+  for (Parameters& pose : poses) options.linear_solver_ordering->AddElementToGroup(pose.data(), 1);
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   if (!summary.IsSolutionUsable()) return failure(Fault::kSolveFailed, "least squares: {}", summary.message);
   result.flange_T_camera = perturb(shared.reference.flange_T_camera, as_vector(hand_eye.data()));
-  result.base_T_board = perturb(shared.reference.base_T_board, as_vector(board.data()));
-  for (std::size_t i = 0; i < views.size(); ++i) result.deviations[i] = as_vector(arm[i].data());
+  for (std::size_t k = 0; k < boards.size(); ++k) {
+    result.base_T_board[k] = perturb(shared.reference.base_T_board[k], as_vector(boards[k].data()));
+  }
+  for (std::size_t i = 0; i < arm.size(); ++i) result.deviations[i] = as_vector(arm[i].data());
   return {};
 }
 
 }  // namespace
 
-Status solve_bundle(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const BundleView> views,
-                    const BundleNoise& noise, int iterations_max, BundleState& state) {
+Status solve_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> boards,
+                    std::span<const BundleView> views, const BundleNoise& noise, int iterations_max,
+                    BundleState& state) {
   // Refuses what has no image at the start, and with it everything that is not finite.
-  if (const auto start = linearize_bundle(camera, board, views, noise.corner_sigma_px, state); !start) {
+  if (const auto start = linearize_bundle(camera, boards, views, noise.corner_sigma_px, state); !start) {
     return std::unexpected(start.error());
   }
   const BundleState reference = state;
-  const Shared shared{camera, board, reference, noise};
+  const Shared shared{camera, boards, reference, noise};
   try {
     return run_ceres(shared, views, iterations_max, state);
   } catch (const std::bad_alloc&) {
@@ -136,13 +144,14 @@ Status solve_bundle(const CameraIntrinsics& camera, const BoardSpec& board, std:
   }
 }
 
-Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera, const BoardSpec& board,
+Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> boards,
                                           std::span<const BundleView> views, double corner_sigma_px,
                                           const BundleState& state) {
   LinearizedBundle result;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const ViewGeometry geometry{state.flange_T_camera, state.base_T_board,
-                                perturb(views[v].base_T_flange_said, state.deviations[v])};
+    const ViewGeometry geometry{state.flange_T_camera, state.base_T_board[views[v].board],
+                                perturb(views[v].base_T_flange_said, state.deviations[views[v].station])};
+    const BoardSpec& board = boards[views[v].board];
     ViewNormal normal;
     double squared = 0;
     for (std::size_t i = 0; i < views[v].points.size(); ++i) {

@@ -14,13 +14,15 @@ struct BundleView {
   Pose base_T_flange_said = Pose::Identity();
   SeenPoints points;
   std::span<const double> weights;  ///< one for each point, 0 to 1
+  std::size_t board = 0;            ///< number in BundleState::base_T_board
+  std::size_t station = 0;          ///< number in BundleState::deviations
 };
 
 /// What is solved for.
 struct BundleState {
   Pose flange_T_camera = Pose::Identity();
-  Pose base_T_board = Pose::Identity();
-  std::vector<Vector6d> deviations;  ///< true flange against said, one for each view
+  std::vector<Pose> base_T_board;
+  std::vector<Vector6d> deviations;  ///< true flange against said, one for each station
 };
 
 struct BundleNoise {
@@ -31,7 +33,8 @@ struct BundleNoise {
 /// Minimises the whitened squares from `state` on, at most `iterations_max` steps. Single thread, deterministic.
 /// @return kSolveFailed when a corner has no image at the start, for numbers that are not finite, or when no step
 /// helps; kOutOfMemory
-[[nodiscard]] Status solve_bundle(const CameraIntrinsics& camera, const BoardSpec& board,
+/// @param boards  by BundleView::board
+[[nodiscard]] Status solve_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> boards,
                                   std::span<const BundleView> views, const BundleNoise& noise, int iterations_max,
                                   BundleState& state);
 
@@ -41,7 +44,8 @@ struct LinearizedBundle {
   std::vector<double> squared_px;   ///< weighted sum of squared residuals of each view
   double weighted_coordinates = 0;  ///< two for each corner of weight 1
 };
-[[nodiscard]] Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera, const BoardSpec& board,
+[[nodiscard]] Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera,
+                                                        std::span<const BoardSpec> boards,
                                                         std::span<const BundleView> views, double corner_sigma_px,
                                                         const BundleState& state);
 

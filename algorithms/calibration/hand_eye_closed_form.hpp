@@ -12,6 +12,8 @@ namespace firstlook {
 /// Solves pairs in any order: the same pairs give the same bits. Exact on noise-free data to rounding (1e-9 mm, 1e-9
 /// rad for motions of 20 degrees and more, any hand-eye rotation). With 25 pairs 0.1 to 2 ms, growing with the square
 /// of their number.
+/// With several targets motions are those between views of the same one; the solvers of AX = YB then get all views as
+/// if they showed the lowest numbered target, whose pose is their base_T_board.
 /// @return kTooFewViews; kDegenerateMotion, which names what is missing: axes, angles, or what this solver cannot take
 /// (solver_table); kSolveFailed for poses that are not finite or not rigid
 [[nodiscard]] Result<HandEyeSolution> solve_pose_pairs(std::span<const PosePair> pairs, Solver solver);
@@ -20,7 +22,8 @@ namespace firstlook {
 [[nodiscard]] Result<Transform<Flange, Camera>> solve_closed_form(std::span<const PosePair> pairs,
                                                                   Solver solver = Solver::kParkMartin);
 
-/// Mean over the views of base_T_flange * flange_T_camera * camera_T_board (rotations: chordal mean).
+/// Mean over the views, all of one target, of base_T_flange * flange_T_camera * camera_T_board (rotations: chordal
+/// mean).
 [[nodiscard]] Transform<Base, Board> mean_board_pose(std::span<const PosePair> pairs,
                                                      const Transform<Flange, Camera>& flange_T_camera);
 

@@ -1,6 +1,7 @@
 #include "algorithms/calibration/hand_eye_refinement.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "algorithms/calibration/arm_sigma.hpp"
@@ -25,36 +26,56 @@ struct PreparedView {
   std::vector<double> weights;
 };
 
-Status check_input(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+/// One place of the arm has one pose, and shows a target once.
+Status check_stations(std::span<const CalibrationView> views) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    for (std::size_t j = 0; j < i && views[i].station >= 0; ++j) {
+      if (views[j].station != views[i].station) continue;
+      if (views[j].target == views[i].target ||
+          views[j].base_T_flange.pose().matrix() != views[i].base_T_flange.pose().matrix()) {
+        return failure(Fault::kDataMalformed,
+                       "views {} and {}: one station, but another pose of the arm or the same target", j + 1, i + 1);
+      }
+    }
+  }
+  return {};
+}
+
+Status check_input(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
                    const Transform<Flange, Camera>& start) {
-  if (const Status fine = check_board(board); !fine) return fine;
+  for (int k = 0; k < targets.size(); ++k) {
+    if (const Status fine = check_board(targets[k]); !fine) return fine;
+  }
   if (!is_usable(camera)) return failure(Fault::kDataMalformed, "camera intrinsics are not usable");
   if (!start.pose().matrix().allFinite()) return failure(Fault::kDataMalformed, "the start is not finite");
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!views[i].base_T_flange.pose().matrix().allFinite()) {
       return failure(Fault::kDataMalformed, "view {}: the arm's pose is not finite", i + 1);
     }
-    if (const Status fine = check_points(board, views[i].points()); !fine) {
+    if (!targets.has(views[i].target)) {
+      return failure(Fault::kDataMalformed, "view {}: target {} of {}", i + 1, views[i].target, targets.size());
+    }
+    if (const Status fine = check_points(targets[views[i].target], views[i].points()); !fine) {
       return failure(Fault::kDataMalformed, "view {}: {}", i + 1, fine.error().detail());
     }
   }
-  return {};
+  return check_stations(views);
 }
 
 /// Corners are weighed against the view's own board pose, where neither the arm nor other views can mislead; which of
 /// two poses that is, when a picture allows both, the views settle under the start.
-std::vector<PreparedView> prepare(const CameraIntrinsics& camera, const BoardSpec& board,
+std::vector<PreparedView> prepare(const CameraIntrinsics& camera, const Targets& targets,
                                   std::span<const CalibrationView> views, const Transform<Flange, Camera>& start,
                                   const RefinementOptions& options) {
   std::vector<PreparedView> prepared;
   std::vector<OpenView> open;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    auto seen = estimate_board_pose_robust(camera, board, views[i].points(), kBoardResidualMax_px,
+    auto seen = estimate_board_pose_robust(camera, targets[views[i].target], views[i].points(), kBoardResidualMax_px,
                                            options.corner_loss_scale, options.corner_sigma_min_px);
     if (!seen) continue;
     open.push_back(seen_one_way(views[i], seen->pose));
     prepared.push_back({i,
-                        {views[i].base_T_flange, seen->pose.camera_T_board},
+                        {views[i].base_T_flange, seen->pose.camera_T_board, views[i].target, views[i].station},
                         std::move(seen->residuals_px),
                         std::move(seen->weights)});
   }
@@ -86,23 +107,72 @@ std::vector<PosePair> pairs_of(std::span<const PreparedView> views) {
 /// A start for the arm's sigmas, too large rather than too small: what the views' poses disagree by.
 ArmSigma rough_arm_sigma(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera,
                          const RefinementOptions& options) {
-  const auto misfits = flange_misfits(pairs, flange_T_camera, median_board_pose(pairs, flange_T_camera));
+  const auto misfits = flange_misfits(pairs, flange_T_camera, median_board_poses(pairs, flange_T_camera));
   const std::vector<Matrix6d> exact(misfits.size(), Matrix6d::Zero());
   return next_arm_sigma(misfits, exact, options);
 }
 
+/// The unknowns of a solve: the boards that its views show, and the places of the arm they were taken from.
+struct Layout {
+  std::vector<int> targets;  ///< of each board of the bundle
+  std::vector<BoardSpec> boards;
+  std::vector<std::size_t> board;    ///< of each view
+  std::vector<std::size_t> station;  ///< of each view
+  std::size_t stations = 0;
+};
+
+Layout layout_of(const Targets& targets, std::span<const PosePair> pairs) {
+  Layout layout;
+  std::vector<std::size_t> number(static_cast<std::size_t>(targets.size()));
+  for (int k = 0; k < targets.size(); ++k) {
+    number[static_cast<std::size_t>(k)] = layout.targets.size();
+    if (pairs_of_target(pairs, k).empty()) continue;
+    layout.targets.push_back(k);
+    layout.boards.push_back(targets[k]);
+  }
+  for (const PosePair& pair : pairs) layout.board.push_back(number[static_cast<std::size_t>(pair.target)]);
+  layout.station = stations_of(pairs);
+  layout.stations = station_count(layout.station);
+  return layout;
+}
+
 struct Fit {
+  Layout layout;
   BundleState state;
   BundleNoise noise;
   LinearSolution linear;
   LinearizedBundle bundle;
 };
 
+/// The normal equations of all stations, as solve_linear and estimate_arm_sigma take them when there are several
+/// boards.
+std::vector<StationNormal> station_normals(const Fit& fit) {
+  std::vector<StationNormal> stations(fit.layout.stations, StationNormal(static_cast<int>(fit.layout.boards.size())));
+  for (std::size_t i = 0; i < fit.bundle.views.size(); ++i) {
+    stations[fit.layout.station[i]].add(fit.bundle.views[i], fit.layout.board[i]);
+  }
+  return stations;
+}
+
+/// One board has equations of fixed size, a third faster.
+std::optional<LinearSolution> solve_linear_of(const Fit& fit, const ArmSigma& sigma) {
+  if (fit.layout.boards.size() == 1) return solve_linear(fit.bundle.views, fit.state.deviations, sigma);
+  return solve_linear(station_normals(fit), fit.state.deviations, sigma);
+}
+
+std::optional<ArmSigma> arm_sigma_of(const Fit& fit, const ArmSigma& start, const RefinementOptions& options) {
+  if (fit.layout.boards.size() == 1) {
+    return estimate_arm_sigma(fit.bundle.views, fit.state.deviations, start, options);
+  }
+  return estimate_arm_sigma(station_normals(fit), fit.state.deviations, start, options);
+}
+
 /// What an estimated sigma must be taken for in a covariance: with v degrees of freedom its square is uncertain, and
-/// the errors scatter by v / (v - 2) more than it says (Student 1908). Three for each view, less half of the twelve
-/// unknowns.
-ArmSigma as_unsure(ArmSigma sigma, std::size_t views, const RefinementOptions& options) {
-  const double freedom = std::max(3.0, 3 * static_cast<double>(views) - 6);
+/// the errors scatter by v / (v - 2) more than it says (Student 1908). Three for each station, less half of the
+/// unknowns of hand-eye and boards.
+ArmSigma as_unsure(ArmSigma sigma, const Layout& layout, const RefinementOptions& options) {
+  const double unknowns = 6 + 6 * static_cast<double>(layout.boards.size());
+  const double freedom = std::max(3.0, 3 * static_cast<double>(layout.stations) - unknowns / 2);
   const double factor = std::sqrt(freedom / (freedom - 2));
   if (options.arm_sigma.translation_m <= 0) sigma.translation_m *= factor;
   if (options.arm_sigma.rotation_rad <= 0) sigma.rotation_rad *= factor;
@@ -110,23 +180,23 @@ ArmSigma as_unsure(ArmSigma sigma, std::size_t views, const RefinementOptions& o
 }
 
 /// Rounds of solving and estimating the sigmas, until these settle.
-Result<Fit> fit_bundle(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const BundleView> views,
-                       Fit fit, const RefinementOptions& options) {
+Result<Fit> fit_bundle(const CameraIntrinsics& camera, std::span<const BundleView> views, Fit fit,
+                       const RefinementOptions& options) {
   constexpr double kSettled = 0.003;  // relative change of a sigma
   for (int round = 0; round < options.rounds_max; ++round) {
-    const Status solved = solve_bundle(camera, board, views, fit.noise, options.iterations_max, fit.state);
+    const Status solved = solve_bundle(camera, fit.layout.boards, views, fit.noise, options.iterations_max, fit.state);
     if (!solved) return std::unexpected(solved.error());
-    auto bundle = linearize_bundle(camera, board, views, fit.noise.corner_sigma_px, fit.state);
+    auto bundle = linearize_bundle(camera, fit.layout.boards, views, fit.noise.corner_sigma_px, fit.state);
     if (!bundle) return std::unexpected(bundle.error());
     fit.bundle = std::move(*bundle);
     const BundleNoise before = fit.noise;
     const bool last = round + 1 == options.rounds_max;
     if (!last) {
-      const auto arm = estimate_arm_sigma(fit.bundle.views, fit.state.deviations, before.arm_sigma, options);
+      const auto arm = arm_sigma_of(fit, before.arm_sigma, options);
       if (!arm) return failure(Fault::kDegenerateMotion, "the views leave a direction undetermined");
       fit.noise.arm_sigma = *arm;
     }
-    const auto linear = solve_linear(fit.bundle.views, fit.state.deviations, fit.noise.arm_sigma);
+    const auto linear = solve_linear_of(fit, fit.noise.arm_sigma);
     if (!linear) return failure(Fault::kDegenerateMotion, "the views leave a direction undetermined");
     fit.linear = *linear;
     if (last) break;
@@ -141,13 +211,12 @@ Result<Fit> fit_bundle(const CameraIntrinsics& camera, const BoardSpec& board, s
                                     std::abs(fit.noise.arm_sigma.rotation_rad / before.arm_sigma.rotation_rad - 1)});
     if (change < kSettled) break;
   }
-  const auto unsure =
-      solve_linear(fit.bundle.views, fit.state.deviations, as_unsure(fit.noise.arm_sigma, views.size(), options));
+  const auto unsure = solve_linear_of(fit, as_unsure(fit.noise.arm_sigma, fit.layout, options));
   if (unsure) fit.linear.covariance = unsure->covariance;
   return fit;
 }
 
-Result<Fit> fit_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> given,
+Result<Fit> fit_views(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> given,
                       std::span<const PreparedView> used, const Transform<Flange, Camera>& start,
                       const RefinementOptions& options) {
   const std::vector<PosePair> pairs = pairs_of(used);
@@ -156,27 +225,44 @@ Result<Fit> fit_views(const CameraIntrinsics& camera, const BoardSpec& board, st
   if (diversity.axes < 2) {
     return failure(Fault::kDegenerateMotion, "{} usable views turn about fewer than two axes", pairs.size());
   }
-  std::vector<BundleView> views;
-  for (const PreparedView& view : used) {
-    views.push_back({view.pair.base_T_flange.pose(), given[view.index].points(), view.weights});
-  }
   Fit fit;
+  fit.layout = layout_of(targets, pairs);
+  std::vector<BundleView> views;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    views.push_back({used[i].pair.base_T_flange.pose(), given[used[i].index].points(), used[i].weights,
+                     fit.layout.board[i], fit.layout.station[i]});
+  }
   fit.state.flange_T_camera = start.pose();
-  fit.state.base_T_board = median_board_pose(pairs, start).pose();
-  fit.state.deviations.assign(views.size(), Vector6d::Zero());
+  const auto poses = median_board_poses(pairs, start);
+  for (const int k : fit.layout.targets) fit.state.base_T_board.push_back(poses[static_cast<std::size_t>(k)].pose());
+  fit.state.deviations.assign(fit.layout.stations, Vector6d::Zero());
   fit.noise.corner_sigma_px = options.corner_sigma_px > 0
                                   ? options.corner_sigma_px
                                   : std::max(options.corner_sigma_min_px, robust_corner_sigma(used));
   fit.noise.arm_sigma = rough_arm_sigma(pairs, start, options);
-  return fit_bundle(camera, board, views, std::move(fit), options);
+  return fit_bundle(camera, views, std::move(fit), options);
 }
 
-Refinement report(const Fit& fit, std::span<const PreparedView> used, std::size_t given) {
+/// Poses of the boards with what the linear solution says of them.
+void report_targets(const Fit& fit, int targets, Refinement& result) {
+  result.targets.resize(static_cast<std::size_t>(targets));
+  for (std::size_t b = 0; b < fit.layout.targets.size(); ++b) {
+    TargetPose& target = result.targets[static_cast<std::size_t>(fit.layout.targets[b])];
+    const auto at = 6 + 6 * static_cast<Eigen::Index>(b);
+    target.base_T_board = Transform<Base, Board>(fit.state.base_T_board[b]);
+    target.covariance = fit.linear.covariance.block<6, 6>(at, at);
+    target.views = static_cast<int>(std::count(fit.layout.board.begin(), fit.layout.board.end(), b));
+  }
+  result.joint_covariance = fit.linear.covariance;
+}
+
+Refinement report(const Fit& fit, std::span<const PreparedView> used, int targets, std::size_t given) {
   Refinement result;
   result.flange_T_camera = Transform<Flange, Camera>(fit.state.flange_T_camera);
-  result.base_T_board = Transform<Base, Board>(fit.state.base_T_board);
+  result.base_T_board = Transform<Base, Board>(fit.state.base_T_board.front());
   result.covariance = fit.linear.covariance.topLeftCorner<6, 6>();
-  result.board_covariance = fit.linear.covariance.bottomRightCorner<6, 6>();
+  result.board_covariance = fit.linear.covariance.block<6, 6>(6, 6);
+  report_targets(fit, targets, result);
   result.corner_sigma_px = fit.noise.corner_sigma_px;
   result.arm_sigma = fit.noise.arm_sigma;
   result.views.resize(given);
@@ -188,12 +274,12 @@ Refinement report(const Fit& fit, std::span<const PreparedView> used, std::size_
     ViewFit& view = result.views[used[i].index];
     view.used = true;
     view.reprojection_rms_px = std::sqrt(fit.bundle.squared_px[i] / std::max(1.0, own_weights));
-    view.arm_deviation = fit.state.deviations[i];
+    view.arm_deviation = fit.state.deviations[fit.layout.station[i]];
     squared += fit.bundle.squared_px[i];
     weights += own_weights;
   }
   result.reprojection_rms_px = std::sqrt(squared / std::max(1.0, weights));
-  result.views_used = static_cast<int>(used.size());
+  result.views_used = static_cast<int>(fit.layout.stations);
   return result;
 }
 
@@ -214,11 +300,40 @@ bool same_views(std::span<const PreparedView> a, std::span<const PreparedView> b
 
 }  // namespace
 
-Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+std::optional<MutualPose> mutual_pose(std::span<const TargetPose> targets, const Eigen::MatrixXd& joint_covariance,
+                                      int from, int to) {
+  const auto place = [&](int target) {
+    Eigen::Index at = 6;
+    for (int k = 0; k < target; ++k) at += targets[static_cast<std::size_t>(k)].views > 0 ? 6 : 0;
+    return at;
+  };
+  const TargetPose &a = targets[static_cast<std::size_t>(from)], &b = targets[static_cast<std::size_t>(to)];
+  if (a.views == 0 || b.views == 0) return std::nullopt;
+  // With errors d_t, d_r of both in base: t = R_a^T (t_b - t_a), R = R_a^T R_b, each to first order.
+  const Eigen::Matrix3d turned = a.base_T_board.rotation().transpose();
+  const Eigen::Vector3d between = b.base_T_board.translation() - a.base_T_board.translation();
+  Eigen::Matrix<double, 6, 12> jacobian = Eigen::Matrix<double, 6, 12>::Zero();
+  jacobian.block<3, 3>(0, 0) = -turned;
+  jacobian.block<3, 3>(0, 3) = turned * cross_matrix(between);
+  jacobian.block<3, 3>(3, 3) = -turned;
+  jacobian.block<3, 3>(0, 6) = turned;
+  jacobian.block<3, 3>(3, 9) = turned;
+  const std::array<Eigen::Index, 2> at = {place(from), place(to)};
+  Matrix12d both;
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t j = 0; j < 2; ++j) {
+      both.block<6, 6>(6 * static_cast<Eigen::Index>(i), 6 * static_cast<Eigen::Index>(j)) =
+          joint_covariance.block<6, 6>(at[i], at[j]);
+    }
+  }
+  return MutualPose{a.base_T_board.inverse() * b.base_T_board, jacobian * both * jacobian.transpose()};
+}
+
+Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                    std::span<const CalibrationView> views, const Transform<Flange, Camera>& start,
                                    const RefinementOptions& options) {
-  if (const Status fine = check_input(camera, board, views, start); !fine) return std::unexpected(fine.error());
-  std::vector<PreparedView> prepared = prepare(camera, board, views, start, options);
+  if (const Status fine = check_input(camera, targets, views, start); !fine) return std::unexpected(fine.error());
+  std::vector<PreparedView> prepared = prepare(camera, targets, views, start, options);
   if (prepared.size() < 3) {
     return failure(Fault::kTooFewViews, "{} of {} views show the board, 3 are the least", prepared.size(),
                    views.size());
@@ -228,11 +343,11 @@ Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const BoardSp
   std::vector<PreparedView> used = without_gated(prepared, hand_eye, options.view_gate);
   constexpr int kGatingsMax = 3;
   for (int gating = 1;; ++gating) {
-    const auto fit = fit_views(camera, board, views, used, hand_eye, options);
+    const auto fit = fit_views(camera, targets, views, used, hand_eye, options);
     if (!fit) return std::unexpected(fit.error());
     hand_eye = Transform<Flange, Camera>(fit->state.flange_T_camera);
     std::vector<PreparedView> again = without_gated(prepared, hand_eye, options.view_gate);
-    if (gating == kGatingsMax || same_views(again, used)) return report(*fit, used, views.size());
+    if (gating == kGatingsMax || same_views(again, used)) return report(*fit, used, targets.size(), views.size());
     used = std::move(again);
   }
 }

@@ -1,11 +1,13 @@
-/// Joint least squares over the hand-eye transform, the board's pose, and a deviation of the arm in each view.
+/// Joint least squares over the hand-eye transform, the poses of one board or several, and a deviation of the arm at
+/// each place of it.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "algorithms/calibration/calibration_view.hpp"
-#include "algorithms/vision/target.hpp"
+#include "algorithms/vision/target_set.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 
@@ -40,29 +42,51 @@ struct ViewFit {
   Vector6d arm_deviation = Vector6d::Zero();  ///< true flange minus said flange as pose_difference: m, rad, base axes
 };
 
+/// Where one of the targets is.
+struct TargetPose {
+  int views = 0;  ///< used ones that show it; 0: it could not be solved
+  Transform<Base, Board> base_T_board;
+  Matrix6d covariance = Matrix6d::Zero();  ///< see pose_difference
+};
+
+/// One target as seen from another.
+struct MutualPose {
+  Transform<Board, Board> pose;
+  Matrix6d covariance = Matrix6d::Zero();  ///< see pose_difference: in the axes of the target seen from
+};
+
 struct Refinement {
   Transform<Flange, Camera> flange_T_camera;
-  Transform<Base, Board> base_T_board;
+  Transform<Base, Board> base_T_board;           ///< of the first target that was solved
   Matrix6d covariance = Matrix6d::Zero();        ///< of flange_T_camera, see pose_difference
   Matrix6d board_covariance = Matrix6d::Zero();  ///< of base_T_board
   double corner_sigma_px = 0;
   ArmSigma arm_sigma;
-  double reprojection_rms_px = 0;  ///< over the used views, for each coordinate; 0 when there were no corners
-  std::vector<ViewFit> views;      ///< one for each input view
-  int views_used = 0;
+  double reprojection_rms_px = 0;    ///< over the used views, for each coordinate; 0 when there were no corners
+  std::vector<ViewFit> views;        ///< one for each input view
+  int views_used = 0;                ///< places of the arm with a used view
+  std::vector<TargetPose> targets;   ///< one for each target given
+  Eigen::MatrixXd joint_covariance;  ///< of flange_T_camera, then base_T_board of each solved target in their order
 };
+
+/// Pose of target `to` in `from` with its covariance, correlations included; empty unless both were solved.
+[[nodiscard]] std::optional<MutualPose> mutual_pose(std::span<const TargetPose> targets,
+                                                    const Eigen::MatrixXd& joint_covariance, int from, int to);
 
 /// Refines from a start within some centimetres and tens of degrees. Bundle of the reprojection errors with a Gaussian
 /// prior on each view's arm deviation (Strobl and Hirzinger 2006 in idea), sigmas by expectation maximisation. Corners
 /// and views that do not fit are weighted down or left out. Single thread, about 70 ms for 25 views of 48 corners.
+/// Several targets are solved together, seen in any subsets: each view counts for the hand-eye transform through the
+/// other views of its target, views of one station share their deviation. A target's only view tells where it is and
+/// nothing of the hand-eye; a target without a usable view is left out of `targets`.
 /// @return kTooFewViews below 3 views; kDataMalformed for numbers that are not finite or wrong counts;
 /// kDegenerateMotion when the normal equations are singular; kSolveFailed
-[[nodiscard]] Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+[[nodiscard]] Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                                  std::span<const CalibrationView> views,
                                                  const Transform<Flange, Camera>& start,
                                                  const RefinementOptions& options = {});
 
-/// The same from pose pairs alone: what does not fit is all taken for deviation of the arm.
+/// The same from pose pairs of one target alone: what does not fit is all taken for deviation of the arm.
 [[nodiscard]] Result<Refinement> refine_from_pairs(std::span<const PosePair> pairs,
                                                    const Transform<Flange, Camera>& start,
                                                    const RefinementOptions& options = {});

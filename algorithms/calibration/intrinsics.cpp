@@ -9,14 +9,14 @@
 namespace firstlook {
 namespace {
 
-IntrinsicsEstimate calibrate(int width, int height, const BoardSpec& board, std::span<const CalibrationView> views) {
+IntrinsicsEstimate calibrate(int width, int height, const Targets& targets, std::span<const CalibrationView> views) {
   std::vector<std::vector<cv::Point3f>> objects;
   std::vector<std::vector<cv::Point2f>> images;
   for (const CalibrationView& view : views) {
     auto& object = objects.emplace_back();
     auto& image = images.emplace_back();
     for (std::size_t i = 0; i < view.corners_px.size(); ++i) {
-      const Eigen::Vector3f p = board.corner(point_of(view.ids, i)).cast<float>();
+      const Eigen::Vector3f p = targets[view.target].corner(point_of(view.ids, i)).cast<float>();
       const Eigen::Vector2f px = view.corners_px[i].cast<float>();
       object.emplace_back(p.x(), p.y(), p.z());
       image.emplace_back(px.x(), px.y());
@@ -43,18 +43,19 @@ IntrinsicsEstimate calibrate(int width, int height, const BoardSpec& board, std:
 
 }  // namespace
 
-Result<IntrinsicsEstimate> estimate_intrinsics(int width, int height, const BoardSpec& board,
+Result<IntrinsicsEstimate> estimate_intrinsics(int width, int height, const Targets& targets,
                                                std::span<const CalibrationView> views) {
   constexpr std::size_t kViewsMin = 4;
   if (views.size() < kViewsMin) {
     return failure(Fault::kTooFewViews, "{} views, the camera's intrinsics need {}", views.size(), kViewsMin);
   }
   for (const CalibrationView& view : views) {
-    if (const Status fine = check_points(board, view.points()); !fine) return std::unexpected(fine.error());
+    if (const Status fine = check_points(targets[view.target], view.points()); !fine)
+      return std::unexpected(fine.error());
   }
   try {
     cv::setNumThreads(1);
-    const IntrinsicsEstimate estimate = calibrate(width, height, board, views);
+    const IntrinsicsEstimate estimate = calibrate(width, height, targets, views);
     if (!is_usable(estimate.camera) || !(estimate.reprojection_rms_px < 5)) {
       return failure(Fault::kSolveFailed,
                      "the camera's intrinsics cannot be told from these views: fx {:.0f}, RMS {:.1f} px",

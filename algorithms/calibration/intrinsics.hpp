@@ -4,7 +4,7 @@
 #include <span>
 
 #include "algorithms/calibration/calibration_view.hpp"
-#include "algorithms/vision/target.hpp"
+#include "algorithms/vision/target_set.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 
@@ -17,7 +17,7 @@ struct IntrinsicsEstimate {
 
 /// Focal lengths, centre, k1, k2, p1, p2 (k3 = 0) from at least four views of different tilt. Uses the corners only.
 /// @return kTooFewViews, kSolveFailed
-[[nodiscard]] Result<IntrinsicsEstimate> estimate_intrinsics(int width, int height, const BoardSpec& board,
+[[nodiscard]] Result<IntrinsicsEstimate> estimate_intrinsics(int width, int height, const Targets& targets,
                                                              std::span<const CalibrationView> views);
 
 }  // namespace firstlook

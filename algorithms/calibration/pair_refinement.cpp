@@ -115,6 +115,8 @@ Refinement report(const PairFit& fit, std::span<const std::size_t> used, std::si
   result.base_T_board = Transform<Base, Board>(fit.state.base_T_board);
   result.covariance = fit.covariance.topLeftCorner<6, 6>();
   result.board_covariance = fit.covariance.bottomRightCorner<6, 6>();
+  result.joint_covariance = fit.covariance;
+  result.targets = {{static_cast<int>(used.size()), result.base_T_board, result.board_covariance}};
   result.arm_sigma = fit.sigma;
   result.views.resize(given);
   for (ViewFit& view : result.views) view.used = false;

@@ -38,6 +38,7 @@ struct ViewNormal {
   Vector12d global_right = Vector12d::Zero();
   Vector6d arm_right = Vector6d::Zero();
 
+  static constexpr int kGlobal = 12;
   /// Adds a corner with its residual (observed minus predicted, px) and weight (1 / px^2).
   void add(const CornerTerm& term, const Eigen::Vector2d& residual, double weight);
 };

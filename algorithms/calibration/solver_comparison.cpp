@@ -98,8 +98,9 @@ std::string_view name_of(PoseFigure figure) { return kNames[static_cast<std::siz
 SolverComparison compare_solvers(std::span<const PosePair> pairs, const HandEyeResult& result,
                                  const HandEyeOptions& options) {
   SolverComparison comparison;
-  comparison.views = pairs.size();
-  ViewSubsets random(pairs.size(), options.subset_share, options.seed);
+  const std::vector<std::size_t> station = stations_of(pairs);
+  ViewSubsets random(station_count(station), options.subset_share, options.seed);
+  comparison.views = station_count(station);
   comparison.views_of_solve = random.size();
   const double quick = std::min(1.0, std::pow(kPairsQuick / std::max(1.0, static_cast<double>(pairs.size())), 2));
   comparison.subsets =
@@ -107,7 +108,10 @@ SolverComparison compare_solvers(std::span<const PosePair> pairs, const HandEyeR
   std::vector<std::vector<PosePair>> subsets;
   for (int i = 0; i < comparison.subsets; ++i) {
     auto& subset = subsets.emplace_back();
-    for (const std::size_t k : random.next()) subset.push_back(pairs[k]);
+    const std::vector<std::size_t> drawn = random.next();
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      if (std::binary_search(drawn.begin(), drawn.end(), station[k])) subset.push_back(pairs[k]);
+    }
   }
   const Figures reference = figures_of(result.flange_T_camera);
   SubsetSolves refined;

@@ -35,7 +35,7 @@ struct SubsetSolves {
 };
 
 struct SolverComparison {
-  std::size_t views = 0;           ///< that the calibration used
+  std::size_t views = 0;           ///< places of the arm that the calibration used
   std::size_t views_of_solve = 0;  ///< in each subset
   int subsets = 0;                 ///< of the solvers
   int refined_subsets = 0;

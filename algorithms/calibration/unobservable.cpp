@@ -48,11 +48,17 @@ Eigen::Vector3d upright(const Eigen::Vector3d& v) {
 }  // namespace
 
 Unobservable unobservable_of(std::span<const PosePair> pairs) {
+  std::size_t motions = 0;
+  for (int k = 0; k < target_count(pairs); ++k) {
+    const std::size_t own = pairs_of_target(pairs, k).size();
+    motions += own * own;
+  }
   Matrix6d mean = Matrix6d::Zero();
   for (const PosePair& from : pairs) {
     for (const PosePair& to : pairs) {
+      if (from.target != to.target) continue;
       const Matrix6d change = carried_minus_itself((from.base_T_flange.inverse() * to.base_T_flange).pose());
-      mean += change.transpose() * change / static_cast<double>(pairs.size() * pairs.size());
+      mean += change.transpose() * change / static_cast<double>(motions);
     }
   }
   Unobservable result;

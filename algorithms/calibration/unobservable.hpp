@@ -22,8 +22,8 @@ struct Unobservable {
   [[nodiscard]] int parameters() const { return static_cast<int>(translations.size() + turns.size()); }
 };
 
-/// Motions between all views; a direction counts as shown when the flange's motions change it by 1 degree RMS (or a
-/// turn's line by 5 mm).
+/// Motions between all views of the same target; a direction counts as shown when the flange's motions change it by 1
+/// degree RMS (or a turn's line by 5 mm).
 [[nodiscard]] Unobservable unobservable_of(std::span<const PosePair> pairs);
 
 /// "its position along (0.00, 0.00, 1.00) and its turn about ... of the flange are not determined"; empty when

@@ -24,12 +24,23 @@ using Indices = std::vector<std::size_t>;
 struct Validation {
   std::vector<PosePair> pairs;  ///< of the used views
   Indices given;                ///< which of the views given each of them is
+  Indices station;              ///< the place of the arm that each was taken from
+  std::size_t stations = 0;
   std::size_t views_given = 0;
   std::function<Result<Refinement>(const Indices&)> resolve;  ///< a short solve with some of them
   /// Sum of squared reprojection errors (px^2, both coordinates) of one view under a solution; empty without corners.
   std::function<double(std::size_t, const Refinement&)> squared_px;
-  std::vector<double> corners;  ///< seen in each of them
-  Eigen::Vector3d board_center = Eigen::Vector3d::Zero();
+  std::vector<double> corners;                 ///< seen in each of them
+  std::vector<Eigen::Vector3d> board_centers;  ///< by target
+
+  /// The views from some of the stations.
+  [[nodiscard]] Indices views_of(const std::function<bool(std::size_t)>& has_station) const {
+    Indices views;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (has_station(station[i])) views.push_back(i);
+    }
+    return views;
+  }
 };
 
 /// Options of a short solve around a known one: its sigmas, one round, no gating.
@@ -45,20 +56,18 @@ RefinementOptions short_options(const HandEyeOptions& options, const HandEyeResu
 
 /// Each used view is predicted once by a solve without it: five interleaved groups are left out in turn.
 void hold_out(const Validation& validation, HandEyeResult& result) {
-  const std::size_t n = validation.pairs.size();
-  const std::size_t groups = std::min<std::size_t>(5, n);
+  const std::size_t groups = std::min<std::size_t>(5, validation.stations);
   double squared_px = 0, squared_m = 0, views = 0, corners = 0;
   for (std::size_t group = 0; group < groups; ++group) {
-    Indices others;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (i % groups != group) others.push_back(i);
-    }
-    const auto solved = validation.resolve(others);
+    const auto solved = validation.resolve(validation.views_of([&](std::size_t s) { return s % groups != group; }));
     if (!solved) continue;
-    for (std::size_t i = group; i < n; i += groups) {
-      const auto seen =
-          validation.pairs[i].base_T_flange * solved->flange_T_camera * validation.pairs[i].camera_T_board;
-      squared_m += (seen * validation.board_center - solved->base_T_board * validation.board_center).squaredNorm();
+    for (const std::size_t i : validation.views_of([&](std::size_t s) { return s % groups == group; })) {
+      const PosePair& pair = validation.pairs[i];
+      const auto target = static_cast<std::size_t>(pair.target);
+      if (solved->targets[target].views == 0) continue;  // no other view shows it
+      const auto seen = pair.base_T_flange * solved->flange_T_camera * pair.camera_T_board;
+      const Eigen::Vector3d& center = validation.board_centers[target];
+      squared_m += (seen * center - solved->targets[target].base_T_board * center).squaredNorm();
       if (validation.squared_px) {
         const double view_px = validation.squared_px(i, *solved);
         squared_px += view_px;
@@ -75,11 +84,13 @@ void hold_out(const Validation& validation, HandEyeResult& result) {
 
 /// Returns how many of the solves failed.
 int spread_of_subsets(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
-  ViewSubsets subsets(validation.pairs.size(), options.subset_share, options.seed);
+  ViewSubsets subsets(validation.stations, options.subset_share, options.seed);
   double squared_m = 0, squared_rad = 0;
   result.subset_solutions.clear();
   for (int i = 0; i < options.subset_solves; ++i) {
-    const auto subset = validation.resolve(subsets.next());
+    const Indices drawn = subsets.next();
+    const auto is_drawn = [&](std::size_t s) { return std::binary_search(drawn.begin(), drawn.end(), s); };
+    const auto subset = validation.resolve(validation.views_of(is_drawn));
     if (!subset) continue;
     result.subset_solutions.push_back(subset->flange_T_camera);
     const Vector6d d = pose_difference(subset->flange_T_camera.pose(), result.flange_T_camera.pose());
@@ -146,10 +157,12 @@ void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, H
   result.verdict = reasons.empty() ? Verdict::kAccepted : Verdict::kRejected;
 }
 
-void validate(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
+void validate(Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
   result.holdout_rms_px = result.holdout_rms_m = 0;
   result.subset_spread_m = result.subset_spread_rad = 0;
   result.holdout_px.clear();
+  validation.station = stations_of(validation.pairs);
+  validation.stations = station_count(validation.station);
   if (validation.squared_px) result.holdout_px.resize(validation.views_given);
   hold_out(validation, result);
   const int failed = spread_of_subsets(validation, options, result);
@@ -192,6 +205,8 @@ HandEyeResult start_result(const Refinement& refinement, std::span<const PosePai
   HandEyeResult result;
   result.flange_T_camera = refinement.flange_T_camera;
   result.base_T_board = refinement.base_T_board;
+  result.targets = refinement.targets;
+  result.joint_covariance = refinement.joint_covariance;
   result.covariance = refinement.covariance;
   result.board_covariance = refinement.board_covariance;
   result.sigma_translation_m = refinement.covariance.diagonal().head<3>().cwiseMax(0).cwiseSqrt();
@@ -216,14 +231,15 @@ struct UsedViews {
   std::vector<PosePair> pairs;
 };
 
-UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+UsedViews select_views(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
                        std::span<const ViewFit> fits,
                        const std::optional<Transform<Flange, Camera>>& flange_T_camera = {}) {
   UsedViews used;
   std::vector<OpenView> open;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i < fits.size() && !fits[i].used) continue;
-    const auto pose = estimate_board_pose_robust(camera, board, views[i].points());
+    if (!targets.has(views[i].target)) continue;
+    const auto pose = estimate_board_pose_robust(camera, targets[views[i].target], views[i].points());
     if (!pose) continue;
     used.given.push_back(i);
     used.views.push_back(views[i]);
@@ -231,9 +247,33 @@ UsedViews select_views(const CameraIntrinsics& camera, const BoardSpec& board, s
   }
   const auto choices = flange_T_camera ? settle_choices(open, *flange_T_camera) : settle_choices(open);
   for (std::size_t i = 0; i < open.size(); ++i) {
-    used.pairs.push_back({open[i].base_T_flange, open[i].choices[choices[i]].camera_T_board});
+    used.pairs.push_back({open[i].base_T_flange, open[i].choices[choices[i]].camera_T_board, used.views[i].target,
+                          used.views[i].station});
   }
   return used;
+}
+
+/// The same for several targets: a mistake is looked for in the views of each by itself, the first one found is named.
+void name_mistake_of_targets(const CameraIntrinsics& camera, const Targets& targets,
+                             std::span<const CalibrationView> views, const UsedViews& seen, HandEyeResult& result) {
+  for (int k = 0; k < targets.size(); ++k) {
+    std::vector<CalibrationView> own_views;
+    HandEyeResult own;
+    own.verdict = result.verdict;
+    own.flange_T_camera = result.flange_T_camera;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      if (views[i].target != k) continue;
+      own_views.push_back(views[i]);
+      own.fits.push_back(result.fits[i]);
+    }
+    const std::vector<PosePair> own_pairs = pairs_of_target(seen.pairs, k);
+    name_mistake(own_pairs, &targets[k], [&] { return find_likely_mistake(camera, targets[k], own_views); }, own);
+    if (!own.likely_mistake) continue;
+    own.likely_mistake->text = fmt::format("target {}: {}", k + 1, own.likely_mistake->text);
+    result.likely_mistake = std::move(own.likely_mistake);
+    if (result.verdict == Verdict::kRejected) result.reasons.push_back(result.likely_mistake->text);
+    return;
+  }
 }
 
 double squared_error_px(const CameraIntrinsics& camera, const BoardSpec& board, const CalibrationView& view,
@@ -280,48 +320,54 @@ double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board, 
   return corners == 0 ? 0 : std::sqrt(squared / (2 * corners));
 }
 
-Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                      std::span<const CalibrationView> views, const HandEyeOptions& options) {
-  const UsedViews seen = select_views(camera, board, views, {});
+  const UsedViews seen = select_views(camera, targets, views, {});
   const auto start = solve_pose_pairs_robust(seen.pairs, options.solver, options.refinement.view_gate);
   if (!start) return name_unobservable(start.error(), seen.pairs);
-  const auto refinement = refine_hand_eye(camera, board, views, start->flange_T_camera, options.refinement);
+  const auto refinement = refine_hand_eye(camera, targets, views, start->flange_T_camera, options.refinement);
   if (!refinement) return name_unobservable(refinement.error(), seen.pairs);
   HandEyeResult result = start_result(
-      *refinement, select_views(camera, board, views, refinement->views, refinement->flange_T_camera).pairs);
+      *refinement, select_views(camera, targets, views, refinement->views, refinement->flange_T_camera).pairs);
   result.closed_form = start->flange_T_camera;
   result.closed_form_raw = start->raw_flange_T_camera;
   return result;
 }
 
-void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result) {
-  const UsedViews used = select_views(camera, board, views, result.fits, result.flange_T_camera);
+  const UsedViews used = select_views(camera, targets, views, result.fits, result.flange_T_camera);
   const RefinementOptions quick = short_options(options, result);
   Validation validation;
   validation.pairs = used.pairs;
   validation.given = used.given;
   validation.views_given = views.size();
-  validation.board_center = board.center();
+  for (int k = 0; k < targets.size(); ++k) validation.board_centers.push_back(targets[k].center());
   for (const CalibrationView& view : used.views) {
     validation.corners.push_back(static_cast<double>(view.corners_px.size()));
   }
   validation.resolve = [&](const Indices& indices) {
     std::vector<CalibrationView> some;
     for (const std::size_t i : indices) some.push_back(used.views[i]);
-    return refine_hand_eye(camera, board, some, result.flange_T_camera, quick);
+    return refine_hand_eye(camera, targets, some, result.flange_T_camera, quick);
   };
   validation.squared_px = [&](std::size_t i, const Refinement& r) {
-    return squared_error_px(camera, board, used.views[i], r.flange_T_camera, r.base_T_board);
+    const auto target = static_cast<std::size_t>(used.views[i].target);
+    return squared_error_px(camera, targets[used.views[i].target], used.views[i], r.flange_T_camera,
+                            r.targets[target].base_T_board);
   };
   validate(validation, options, result);
-  const std::vector<PosePair> all = select_views(camera, board, views, {}, result.flange_T_camera).pairs;
-  name_mistake(all, &board, [&] { return find_likely_mistake(camera, board, views); }, result);
+  const UsedViews all = select_views(camera, targets, views, {}, result.flange_T_camera);
+  if (targets.size() == 1) {
+    name_mistake(all.pairs, &targets[0], [&] { return find_likely_mistake(camera, targets[0], views); }, result);
+  } else {
+    name_mistake_of_targets(camera, targets, views, all, result);
+  }
 }
 
-std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const BoardSpec& board,
+std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const Targets& targets,
                                  std::span<const CalibrationView> views, const HandEyeResult& result) {
-  return select_views(camera, board, views, result.fits, result.flange_T_camera).pairs;
+  return select_views(camera, targets, views, result.fits, result.flange_T_camera).pairs;
 }
 
 std::vector<PosePair> used_pairs(std::span<const PosePair> pairs, const HandEyeResult& result) {
@@ -332,14 +378,18 @@ std::vector<PosePair> used_pairs(std::span<const PosePair> pairs, const HandEyeR
   return used;
 }
 
-Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                          std::span<const CalibrationView> views, const HandEyeOptions& options) {
-  auto result = solve_hand_eye(camera, board, views, options);
-  if (result) validate_hand_eye(camera, board, views, options, *result);
+  auto result = solve_hand_eye(camera, targets, views, options);
+  if (result) validate_hand_eye(camera, targets, views, options, *result);
   return result;
 }
 
 Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pairs, const HandEyeOptions& options) {
+  if (target_count(pairs) > 1) {
+    return failure(Fault::kDataMalformed, "pose pairs of {} targets; without corners only one is solved",
+                   target_count(pairs));
+  }
   const auto start = solve_pose_pairs_robust(pairs, options.solver, options.refinement.view_gate);
   if (!start) return name_unobservable(start.error(), pairs);
   const auto refinement = refine_from_pairs(pairs, start->flange_T_camera, options.refinement);
@@ -348,6 +398,7 @@ Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pa
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (refinement->views[i].used) validation.pairs.push_back(pairs[i]);
   }
+  validation.board_centers.emplace_back(Eigen::Vector3d::Zero());
   HandEyeResult result = start_result(*refinement, validation.pairs);
   result.closed_form = start->flange_T_camera;
   result.closed_form_raw = start->raw_flange_T_camera;

@@ -44,8 +44,10 @@ struct HandEyeResult {
   Transform<Flange, Camera> flange_T_camera;
   Transform<Flange, Camera> closed_form;      ///< what the chosen solver alone gave: the refinement's start
   std::optional<Matrix3x4d> closed_form_raw;  ///< the same before its rotation was made one, by the linear solvers
-  Transform<Base, Board> base_T_board;
-  Matrix6d covariance = Matrix6d::Zero();  ///< of flange_T_camera: pose_difference, m and rad, flange axes
+  Transform<Base, Board> base_T_board;        ///< of the first target that was solved
+  std::vector<TargetPose> targets;            ///< one for each target given
+  Eigen::MatrixXd joint_covariance;           ///< of flange_T_camera and all solved targets, see Refinement
+  Matrix6d covariance = Matrix6d::Zero();     ///< of flange_T_camera: pose_difference, m and rad, flange axes
   Matrix6d board_covariance = Matrix6d::Zero();
   Eigen::Vector3d sigma_translation_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d sigma_rotation_rad = Eigen::Vector3d::Zero();
@@ -64,7 +66,7 @@ struct HandEyeResult {
   AxXbResidual ax_xb_consecutive;
   AxXbResidual board_in_base;  ///< the board's pose in base by each view against their mean
   bool from_pairs = false;
-  int views = 0;              ///< used in the solve
+  int views = 0;              ///< places of the arm with a view used in the solve
   std::vector<ViewFit> fits;  ///< one for each view given
   /// One for each view given: its reprojection RMS (px) under a solve that left it out; empty for a view that was not
   /// used. Empty as a whole until validated and when solved from pose pairs.
@@ -76,10 +78,12 @@ struct HandEyeResult {
   std::optional<LikelyMistake> likely_mistake;
 };
 
+/// Several targets are solved together as refine_hand_eye says; held out and drawn at random are then whole places of
+/// the arm, with all that was seen from them.
 /// Closed form, refinement, hold-out, subsets, usable distance, verdict. Deterministic. About 1 s for 25 views of 54
 /// corners. A rejected calibration is a value, not an error.
 /// @return the errors of solve_pose_pairs and refine_hand_eye
-[[nodiscard]] Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+[[nodiscard]] Result<HandEyeResult> calibrate_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                                        std::span<const CalibrationView> views,
                                                        const HandEyeOptions& options = {});
 [[nodiscard]] Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pairs,
@@ -87,14 +91,14 @@ struct HandEyeResult {
 
 /// The two halves of calibrate_hand_eye for a job that solves first and validates later: the first leaves holdout,
 /// subsets and usable distance unset and the verdict kRejected, "not validated".
-[[nodiscard]] Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+[[nodiscard]] Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                                    std::span<const CalibrationView> views,
                                                    const HandEyeOptions& options = {});
-void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const CalibrationView> views,
+void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result);
 
 /// The pose pairs that `result` was solved from, settled among the poses that each picture allows.
-[[nodiscard]] std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const BoardSpec& board,
+[[nodiscard]] std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const Targets& targets,
                                                std::span<const CalibrationView> views, const HandEyeResult& result);
 [[nodiscard]] std::vector<PosePair> used_pairs(std::span<const PosePair> pairs, const HandEyeResult& result);
 
@@ -102,7 +106,8 @@ void validate_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board, s
 /// with its figure; empty when none. Part of the verdict, and all of it that holds for a calibration from elsewhere.
 [[nodiscard]] std::vector<std::string> covariance_reasons(const VerdictLimits& limits, const HandEyeResult& result);
 
-/// Reprojection RMS (px, each coordinate) of views that took no part in the solve, the arm's pose taken as said.
+/// Reprojection RMS (px, each coordinate) of views of one target that took no part in the solve, the arm's pose taken
+/// as said.
 [[nodiscard]] double reprojection_rms(const CameraIntrinsics& camera, const BoardSpec& board,
                                       std::span<const CalibrationView> views,
                                       const Transform<Flange, Camera>& flange_T_camera,

@@ -18,6 +18,16 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// The values of views whose target another view shows, too; all when there is no such view.
+std::vector<double> of_repeated_targets(std::span<const PosePair> pairs, const std::vector<double>& values) {
+  std::vector<double> some;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto same = [&](const PosePair& other) { return other.target == pairs[i].target; };
+    if (std::count_if(pairs.begin(), pairs.end(), same) > 1) some.push_back(values[i]);
+  }
+  return some.empty() ? values : some;
+}
+
 /// Sizes of the misfits as one number each, in median (or floor) misfits.
 struct Misfits {
   std::vector<double> ratio;
@@ -25,15 +35,15 @@ struct Misfits {
 };
 
 Misfits measure(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera) {
-  const auto misfits = flange_misfits(pairs, flange_T_camera, median_board_pose(pairs, flange_T_camera));
+  const auto misfits = flange_misfits(pairs, flange_T_camera, median_board_poses(pairs, flange_T_camera));
   std::vector<double> translation, rotation;
   for (const Vector6d& m : misfits) {
     translation.push_back(m.head<3>().norm());
     rotation.push_back(m.tail<3>().norm());
   }
   Misfits result;
-  result.median.translation_m = median(translation);
-  result.median.rotation_rad = median(rotation);
+  result.median.translation_m = median(of_repeated_targets(pairs, translation));
+  result.median.rotation_rad = median(of_repeated_targets(pairs, rotation));
   for (std::size_t i = 0; i < misfits.size(); ++i) {
     result.ratio.push_back(std::max(translation[i] / std::max(kTranslationFloor_m, result.median.translation_m),
                                     rotation[i] / std::max(kRotationFloor_rad, result.median.rotation_rad)));
@@ -49,7 +59,20 @@ std::vector<PosePair> kept(std::span<const PosePair> pairs, const std::vector<bo
   return result;
 }
 
-std::array<PosePair, 4> random_four(std::span<const PosePair> pairs, Random& random) {
+/// The views of each target that four or more show.
+std::vector<std::vector<PosePair>> groups_of_four(std::span<const PosePair> pairs) {
+  std::vector<std::vector<PosePair>> groups;
+  for (int k = 0; k < target_count(pairs); ++k) {
+    std::vector<PosePair> own = pairs_of_target(pairs, k);
+    if (own.size() >= 4) groups.push_back(std::move(own));
+  }
+  return groups;
+}
+
+/// Four different views of one target.
+std::array<PosePair, 4> random_four(std::span<const std::vector<PosePair>> groups, Random& random) {
+  const auto group = groups.size() == 1 ? 0 : static_cast<std::size_t>(random.below(static_cast<int>(groups.size())));
+  const std::vector<PosePair>& pairs = groups[group];
   std::array<std::size_t, 4> chosen{};
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     do {
@@ -63,10 +86,11 @@ std::array<PosePair, 4> random_four(std::span<const PosePair> pairs, Random& ran
 }  // namespace
 
 std::vector<Vector6d> flange_misfits(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera,
-                                     const Transform<Base, Board>& base_T_board) {
+                                     std::span<const Transform<Base, Board>> base_T_board) {
   std::vector<Vector6d> misfits;
   for (const PosePair& pair : pairs) {
-    const auto seen = base_T_board * (flange_T_camera * pair.camera_T_board).inverse();
+    const auto& board = base_T_board[static_cast<std::size_t>(pair.target)];
+    const auto seen = board * (flange_T_camera * pair.camera_T_board).inverse();
     misfits.push_back(pose_difference(seen.pose(), pair.base_T_flange.pose()));
   }
   return misfits;
@@ -105,6 +129,16 @@ Transform<Base, Board> median_board_pose(std::span<const PosePair> pairs,
   return mean_board_pose(near, flange_T_camera);
 }
 
+std::vector<Transform<Base, Board>> median_board_poses(std::span<const PosePair> pairs,
+                                                       const Transform<Flange, Camera>& flange_T_camera) {
+  std::vector<Transform<Base, Board>> poses;
+  for (int k = 0; k < target_count(pairs); ++k) {
+    const std::vector<PosePair> own = pairs_of_target(pairs, k);
+    poses.push_back(own.empty() ? Transform<Base, Board>() : median_board_pose(own, flange_T_camera));
+  }
+  return poses;
+}
+
 std::vector<bool> gate_views(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera,
                              double gate) {
   std::vector<bool> keep;
@@ -120,12 +154,14 @@ Result<HandEyeSolution> solve_pose_pairs_robust(std::span<const PosePair> pairs,
   const Misfits all = measure(pairs, plain->flange_T_camera);
   if (*std::max_element(all.ratio.begin(), all.ratio.end()) <= kStandsOut) return plain;
 
+  const auto groups = groups_of_four(pairs);
+  if (groups.empty()) return plain;
   Random random(1, 2101);
   auto best = plain->flange_T_camera;
   double best_size_m = all.median.size_m();
   for (int trial = 0; trial < kTrials; ++trial) {
     // By any solver that takes every four: it only tells the good views.
-    const auto four = solve_closed_form(random_four(pairs, random), Solver::kParkMartin);
+    const auto four = solve_closed_form(random_four(groups, random), Solver::kParkMartin);
     if (!four) continue;
     const double size_m = measure(pairs, *four).median.size_m();
     if (size_m < best_size_m) {

@@ -13,16 +13,23 @@
 namespace firstlook {
 
 /// Flange pose that a view's board pose predicts, against what the arm said: pose_difference for each view.
+/// @param base_T_board  by target
 [[nodiscard]] std::vector<Vector6d> flange_misfits(std::span<const PosePair> pairs,
                                                    const Transform<Flange, Camera>& flange_T_camera,
-                                                   const Transform<Base, Board>& base_T_board);
+                                                   std::span<const Transform<Base, Board>> base_T_board);
 
-/// Median over the views of the lengths of flange_misfits against median_board_pose.
+/// Median over the views of the lengths of flange_misfits against median_board_poses. A target's only view always fits
+/// and does not count, unless there is no other.
 [[nodiscard]] Misfit median_misfit(std::span<const PosePair> pairs, const Transform<Flange, Camera>& flange_T_camera);
 
-/// The board's pose that most views agree on: component-wise median of position, chordal mean of the rotations near it.
+/// The pose of a board that most views, all of this one, agree on: component-wise median of position, chordal mean of
+/// the rotations near it.
 [[nodiscard]] Transform<Base, Board> median_board_pose(std::span<const PosePair> pairs,
                                                        const Transform<Flange, Camera>& flange_T_camera);
+
+/// The same for each target, by its number; identity for one that no view shows.
+[[nodiscard]] std::vector<Transform<Base, Board>> median_board_poses(std::span<const PosePair> pairs,
+                                                                     const Transform<Flange, Camera>& flange_T_camera);
 
 /// False for each view whose misfit is more than `gate` times the median misfit of all (and more than 0.5 mm and 1
 /// mrad).

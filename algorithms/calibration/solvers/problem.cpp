@@ -8,6 +8,7 @@
 #include <cmath>
 #include <compare>
 #include <numbers>
+#include <optional>
 
 #include "algorithms/calibration/solvers/algebra.hpp"
 
@@ -43,7 +44,7 @@ bool before(const PosePair& left, const PosePair& right) {
       }
     }
   }
-  return false;
+  return left.target < right.target;
 }
 
 MotionDiversity diversity_of(std::span<const Eigen::Vector3d> rotation_vectors, double clear_max_rad) {
@@ -111,14 +112,15 @@ void set_quaternions(Problem& problem) {
     if (m.clear) scatter += m.alpha * m.beta.transpose();
   }
   const Eigen::Quaterniond q(nearest_rotation(scatter));
-  Eigen::Quaterniond first = Eigen::Quaterniond::Identity();
+  std::vector<std::optional<Eigen::Quaterniond>> first(static_cast<std::size_t>(target_count(problem.pairs)));
   std::vector<Eigen::Quaterniond> a, b;
-  for (const View& view : problem.views) {
-    a.emplace_back(view.a.linear());
-    b.emplace_back(view.b.linear());
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    a.emplace_back(problem.views[i].a.linear());
+    b.emplace_back(problem.views[i].b.linear());
     const Eigen::Quaterniond p = a.back().conjugate() * q * b.back();
-    if (a.size() == 1) first = p;
-    if (p.dot(first) < 0) b.back().coeffs() = -b.back().coeffs();
+    auto& board = first[static_cast<std::size_t>(problem.pairs[i].target)];
+    if (!board) board = p;
+    if (p.dot(*board) < 0) b.back().coeffs() = -b.back().coeffs();
   }
   for (std::size_t i = 0; i < a.size(); ++i) {
     problem.views[i].qa = wxyz(a[i]);
@@ -127,7 +129,7 @@ void set_quaternions(Problem& problem) {
   auto motion = problem.motions.begin();
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < a.size(); ++j) {
-      if (i == j) continue;
+      if (i == j || problem.pairs[i].target != problem.pairs[j].target) continue;
       motion->qa = wxyz(a[i] * a[j].conjugate());
       motion->qb = wxyz(b[i] * b[j].conjugate());
       ++motion;
@@ -141,7 +143,7 @@ Status add_motions(Problem& problem) {
   std::vector<Eigen::Vector3d> alpha, beta;
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) {
-      if (i == j) continue;
+      if (i == j || problem.pairs[i].target != problem.pairs[j].target) continue;
       problem.motions.push_back(motion_between(problem.pairs[i], problem.pairs[j]));
       alpha.push_back(problem.motions.back().alpha);
       beta.push_back(problem.motions.back().beta);
@@ -167,6 +169,7 @@ MotionDiversity motion_diversity(std::span<const PosePair> pairs) {
   std::vector<Eigen::Vector3d> alpha;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     for (std::size_t j = i + 1; j < pairs.size(); ++j) {
+      if (pairs[i].target != pairs[j].target) continue;
       alpha.push_back(rotation_log(pairs[i].base_T_flange.rotation().transpose() * pairs[j].base_T_flange.rotation()));
     }
   }

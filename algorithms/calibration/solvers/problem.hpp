@@ -29,6 +29,7 @@ struct MotionDiversity {
   double angle_max_rad = 0;    ///< largest rotation between two views, half turns included
   double second_axis_rad = 0;  ///< RMS rotation about the second of the two strongest axes: the weak direction
 };
+/// Counts motions between views of the same target.
 [[nodiscard]] MotionDiversity motion_diversity(std::span<const PosePair> pairs);
 
 }  // namespace firstlook
@@ -56,7 +57,8 @@ struct Motion {
 struct Problem {
   std::vector<PosePair> pairs;  ///< sorted by their numbers: the order in which views were taken means nothing
   std::vector<View> views;
-  std::vector<Motion> motions;  ///< between every two views, there and back: with noise these are not quite the same
+  /// Between every two views of one target, there and back: with noise these are not quite the same.
+  std::vector<Motion> motions;
 };
 
 struct Requirements {
