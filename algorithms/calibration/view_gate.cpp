@@ -18,14 +18,31 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The values of views whose target another view shows, too; all when there is no such view.
-std::vector<double> of_repeated_targets(std::span<const PosePair> pairs, const std::vector<double>& values) {
-  std::vector<double> some;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto same = [&](const PosePair& other) { return other.target == pairs[i].target; };
-    if (std::count_if(pairs.begin(), pairs.end(), same) > 1) some.push_back(values[i]);
+/// Views of one target that tell a wrong one among them.
+constexpr std::size_t kOwnMedianMin = 3;
+
+/// For each view the median that its value is held against: that of its target, since a small or oblique one is seen
+/// less well than others, but not less than that of all views. The last is that of all; a target's only view always
+/// fits and does not count there, unless there is no other.
+std::vector<double> medians_for(std::span<const PosePair> pairs, std::span<const double> values) {
+  std::vector<std::vector<double>> own(static_cast<std::size_t>(target_count(pairs)));
+  const auto of = [&](const PosePair& pair) -> std::vector<double>& {
+    return own[static_cast<std::size_t>(pair.target)];
+  };
+  for (std::size_t i = 0; i < pairs.size(); ++i) of(pairs[i]).push_back(values[i]);
+  std::vector<double> repeated;
+  for (const std::vector<double>& group : own) {
+    if (group.size() > 1 || own.size() == 1) repeated.insert(repeated.end(), group.begin(), group.end());
   }
-  return some.empty() ? values : some;
+  if (repeated.empty()) repeated.assign(values.begin(), values.end());
+  const double all = median(std::move(repeated));
+  std::vector<double> medians;
+  for (const PosePair& pair : pairs) {
+    const std::vector<double>& group = of(pair);
+    medians.push_back(own.size() == 1 || group.size() < kOwnMedianMin ? all : std::max(all, median(group)));
+  }
+  medians.push_back(all);
+  return medians;
 }
 
 /// Sizes of the misfits as one number each, in median (or floor) misfits.
@@ -42,11 +59,11 @@ Misfits measure(std::span<const PosePair> pairs, const Transform<Flange, Camera>
     rotation.push_back(m.tail<3>().norm());
   }
   Misfits result;
-  result.median.translation_m = median(of_repeated_targets(pairs, translation));
-  result.median.rotation_rad = median(of_repeated_targets(pairs, rotation));
+  const std::vector<double> usual_m = medians_for(pairs, translation), usual_rad = medians_for(pairs, rotation);
+  result.median = {usual_m.back(), usual_rad.back()};
   for (std::size_t i = 0; i < misfits.size(); ++i) {
-    result.ratio.push_back(std::max(translation[i] / std::max(kTranslationFloor_m, result.median.translation_m),
-                                    rotation[i] / std::max(kRotationFloor_rad, result.median.rotation_rad)));
+    result.ratio.push_back(std::max(translation[i] / std::max(kTranslationFloor_m, usual_m[i]),
+                                    rotation[i] / std::max(kRotationFloor_rad, usual_rad[i])));
   }
   return result;
 }

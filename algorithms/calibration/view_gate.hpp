@@ -31,8 +31,8 @@ namespace firstlook {
 [[nodiscard]] std::vector<Transform<Base, Board>> median_board_poses(std::span<const PosePair> pairs,
                                                                      const Transform<Flange, Camera>& flange_T_camera);
 
-/// False for each view whose misfit is more than `gate` times the median misfit of all (and more than 0.5 mm and 1
-/// mrad).
+/// False for each view whose misfit is more than `gate` times the median misfit of all, and that of its target when
+/// three views or more show it (and more than 0.5 mm and 1 mrad).
 [[nodiscard]] std::vector<bool> gate_views(std::span<const PosePair> pairs,
                                            const Transform<Flange, Camera>& flange_T_camera, double gate);
 

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "algorithms/kinematics/arm_model.hpp"
@@ -36,7 +38,7 @@ void narrate(const CalibrationDataset& data) {
   if (data.source == CalibrationSource::kPairs) {
     fmt::print(stderr, "{} pose pairs\n", data.pairs.size());
   } else {
-    fmt::print(stderr, "{} views of a board: {}; {}\n", data.views.size(), describe(data.board),
+    fmt::print(stderr, "{}; {}\n", views_text(data),
                data.source == CalibrationSource::kImages ? "corners found in the images" : "corners as given");
   }
 }
@@ -88,12 +90,43 @@ void print_text(const HandEyeResult& r) {
   if (r.likely_mistake && r.verdict == Verdict::kAccepted) fmt::print("left out         {}\n", r.likely_mistake->text);
 }
 
+void print_targets(const HandEyeResult& r, const std::vector<std::string>& names) {
+  const auto line = [](std::string_view what, std::string_view from, const Pose& pose, const Matrix6d& covariance) {
+    const Eigen::Vector3d t = pose.translation() * 1e3;
+    const Vector6d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt() * 1e3;
+    fmt::print(
+        "{:<16} in {}: ({:.2f}, {:.2f}, {:.2f}) mm, sigma ({:.2f}, {:.2f}, {:.2f}) mm ({:.2f}, {:.2f}, {:.2f}) mrad\n",
+        what, from, t.x(), t.y(), t.z(), sigma[0], sigma[1], sigma[2], sigma[3], sigma[4], sigma[5]);
+  };
+  for (std::size_t k = 0; k < r.targets.size(); ++k) {
+    if (r.targets[k].views == 0) fmt::print("{:<16} not solved: no usable view\n", names[k]);
+    if (r.targets[k].views > 0) line(names[k], "base", r.targets[k].base_T_board.pose(), r.targets[k].covariance);
+  }
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    for (std::size_t other = k + 1; other < names.size(); ++other) {
+      const auto seen = mutual_pose(r.targets, r.joint_covariance, static_cast<int>(k), static_cast<int>(other));
+      if (seen) line(names[other], names[k], seen->pose.pose(), seen->covariance);
+    }
+  }
+}
+
+/// In the views of the first target in which something is found.
+MistakeSearch find_mistake_of_first(const CalibrationDataset& data) {
+  MistakeSearch search;
+  for (std::size_t k = 0; k < data.targets.size() && !search.found; ++k) {
+    std::vector<CalibrationView> own;
+    std::copy_if(data.views.begin(), data.views.end(), std::back_inserter(own),
+                 [&](const CalibrationView& view) { return view.target == static_cast<int>(k); });
+    search = find_likely_mistake(data.camera, data.targets[k].board, own);
+  }
+  return search;
+}
+
 /// Data that cannot be solved at all: why, and what was likely done wrong.
 int fail_to_solve(const CalibrationDataset& data, const Error& error) {
   fail(error, kDataError);
-  const MistakeSearch search = data.source == CalibrationSource::kPairs
-                                   ? find_likely_mistake(data.pairs)
-                                   : find_likely_mistake(data.camera, data.board, data.views);
+  const MistakeSearch search =
+      data.source == CalibrationSource::kPairs ? find_likely_mistake(data.pairs) : find_mistake_of_first(data);
   if (const std::string sentence = search.sentence(); !sentence.empty()) fmt::print(stderr, "{}\n", sentence);
   return kDataError;
 }
@@ -159,10 +192,13 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
   narrate(*data);
   const auto result = data->source == CalibrationSource::kPairs
                           ? calibrate_hand_eye_from_pairs(data->pairs, hand_eye)
-                          : calibrate_hand_eye(data->camera, data->board, data->views, hand_eye);
+                          : calibrate_hand_eye(data->camera, boards_of(data->targets), data->views, hand_eye);
   if (!result) return fail_to_solve(*data, result.error());
   narrate_views(*data, *result);
+  std::vector<std::string> names;
+  for (const NamedTarget& target : data->targets) names.push_back(target.name);
   nlohmann::json hand_eye_object = hand_eye_json(*result, kFlangeFrame, solver_name(hand_eye.solver));
+  if (names.size() > 1) describe_targets(*result, names, hand_eye_object);
   if (!options.out.empty()) {
     RunRecord record = record_of_dataset(options.dataset, *data, *result, hand_eye);
     record.cell = name_of_folder(options.dataset);
@@ -178,6 +214,7 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
     fmt::print("{}\n", hand_eye_object.dump(2));
   } else {
     print_text(*result);
+    if (names.size() > 1) print_targets(*result, names);
   }
   std::fflush(stdout);
   return options.strict && result->verdict == Verdict::kRejected ? kRejected : kSolved;

@@ -26,6 +26,9 @@ constexpr std::array<std::string_view, 8> kPoseColumns = {"image", "x", "y", "z"
 constexpr std::array<std::string_view, 5> kCornerColumns = {"image", "column", "row", "u_px", "v_px"};
 /// For boards whose points have no column and row: corners of markers, number 4 * marker + 0..3 clockwise.
 constexpr std::array<std::string_view, 4> kPointColumns = {"image", "point", "u_px", "v_px"};
+/// Of several targets, which one; numbers count row by row for every type.
+constexpr std::array<std::string_view, 5> kTargetPointColumns = {"image", "point", "u_px", "v_px", "target"};
+constexpr std::array<std::string_view, 6> kTargetCornerColumns = {"image", "column", "row", "u_px", "v_px", "target"};
 constexpr std::array<std::string_view, 14> kPairColumns = {
     "flange_x", "flange_y", "flange_z", "flange_qx", "flange_qy", "flange_qz", "flange_qw",
     "board_x",  "board_y",  "board_z",  "board_qx",  "board_qy",  "board_qz",  "board_qw"};
@@ -104,93 +107,150 @@ Result<std::vector<PosePair>> read_pairs(const fs::path& file) {
   return pairs;
 }
 
-/// A corner as read: which one of its image, and where.
+/// A corner as read: of which image and target, which one, and where.
 struct CornerRow {
   std::string image;
+  std::size_t target = 0;
   int index = 0;
   Eigen::Vector2d pixel;
 };
 
-Result<CornerRow> corner_from(const CsvTable& table, const CsvRow& row, const BoardSpec& board,
+/// corners.csv with what its columns mean.
+struct CornerTable {
+  CsvTable csv;
+  bool numbered = false;       ///< one number for each point instead of column and row
+  bool names_targets = false;  ///< the last column is the target's name
+};
+
+Result<CornerTable> read_corner_table(const fs::path& file, std::span<const NamedTarget> targets) {
+  const auto with = [&](std::span<const std::string_view> columns, bool numbered,
+                        bool names_targets) -> Result<CornerTable> {
+    auto table = read_csv(file, columns);
+    if (!table) return std::unexpected(table.error());
+    return CornerTable{std::move(*table), numbered, names_targets};
+  };
+  const auto has_numbers = [](const NamedTarget& t) { return t.board.has_marker_corners(); };
+  if (targets.size() == 1) {
+    return has_numbers(targets[0]) ? with(kPointColumns, true, false) : with(kCornerColumns, false, false);
+  }
+  auto numbered = with(kTargetPointColumns, true, true);
+  if (numbered || std::any_of(targets.begin(), targets.end(), has_numbers)) return numbered;
+  return with(kTargetCornerColumns, false, true);
+}
+
+Result<std::size_t> target_of(const CornerTable& table, const CsvRow& row, std::span<const NamedTarget> targets) {
+  if (!table.names_targets) return 0;
+  const std::string& name = row.fields.back();
+  const auto found = std::find_if(targets.begin(), targets.end(), [&](const auto& t) { return t.name == name; });
+  if (found != targets.end()) return static_cast<std::size_t>(found - targets.begin());
+  return failure(Fault::kDataMalformed, "{}: no target '{:.40}' in board.yaml", table.csv.place(row), name);
+}
+
+Result<CornerRow> corner_from(const CornerTable& table, const CsvRow& row, std::span<const NamedTarget> targets,
                               const std::optional<CameraIntrinsics>& camera) {
+  const std::string place = table.csv.place(row);
+  const auto target = target_of(table, row, targets);
+  if (!target) return std::unexpected(target.error());
+  const BoardSpec& board = targets[*target].board;
   std::array<double, 4> v{};
-  const std::size_t skipped = board.has_marker_corners() ? 1 : 0;  // one number instead of column and row
+  const std::size_t skipped = table.numbered ? 1 : 0;  // one number instead of column and row
   for (std::size_t i = skipped; i < v.size(); ++i) {
-    const auto number = table.number(row, 1 + i - skipped);
+    const auto number = table.csv.number(row, 1 + i - skipped);
     if (!number) return std::unexpected(number.error());
     v[i] = *number;
   }
   const auto in_range = [](double x, int count) { return x >= 0 && x < count && x == std::floor(x); };
-  if (board.has_marker_corners() && !in_range(v[1], board.corners())) {
-    return failure(Fault::kDataMalformed, "{}: point {} on a board with {}", table.place(row), v[1], board.corners());
+  if (table.numbered && !in_range(v[1], board.corners())) {
+    return failure(Fault::kDataMalformed, "{}: point {} on a board with {}", place, v[1], board.corners());
   }
-  if (!board.has_marker_corners() && (!in_range(v[0], board.inner_columns) || !in_range(v[1], board.inner_rows))) {
-    return failure(Fault::kDataMalformed, "{}: corner column {} row {} on a board of {}x{}", table.place(row), v[0],
-                   v[1], board.inner_columns, board.inner_rows);
+  if (!table.numbered && (!in_range(v[0], board.inner_columns) || !in_range(v[1], board.inner_rows))) {
+    return failure(Fault::kDataMalformed, "{}: corner column {} row {} on a board of {}x{}", place, v[0], v[1],
+                   board.inner_columns, board.inner_rows);
   }
   constexpr double kOutside_px = 1.0;  // refined corners may lie a little outside
   if (camera && (v[2] < -kOutside_px || v[3] < -kOutside_px || v[2] > camera->width - 1 + kOutside_px ||
                  v[3] > camera->height - 1 + kOutside_px)) {
     return failure(Fault::kDataMalformed, "{}: corner at ({}, {}) px lies outside the {}x{} image of camera_info.yaml",
-                   table.place(row), v[2], v[3], camera->width, camera->height);
+                   place, v[2], v[3], camera->width, camera->height);
   }
-  const int lines = board.has_marker_corners() ? 1 : board.inner_columns;
-  return CornerRow{row.fields[0], static_cast<int>(v[1]) * lines + static_cast<int>(v[0]), {v[2], v[3]}};
+  const int lines = table.numbered ? 1 : board.inner_columns;
+  return CornerRow{row.fields[0], *target, static_cast<int>(v[1]) * lines + static_cast<int>(v[0]), {v[2], v[3]}};
 }
 
-/// Corners of each image that has all of them, or enough where the board allows a part; images that have not are noted.
-Result<std::map<std::string, CornerSet>> read_corners(const fs::path& file, const BoardSpec& board,
-                                                      const std::optional<CameraIntrinsics>& camera,
-                                                      std::vector<std::string>& notes) {
-  const auto table = board.has_marker_corners() ? read_csv(file, kPointColumns) : read_csv(file, kCornerColumns);
+/// "images/1.png", and with several targets "images/1.png, door".
+std::string view_name(std::span<const NamedTarget> targets, const std::string& image, std::size_t target) {
+  return targets.size() == 1 ? image : fmt::format("{}, {}", image, targets[target].name);
+}
+
+/// Corners by image and target that has all of them, or enough where the board allows a part; others are noted.
+using CornersFound = std::map<std::pair<std::string, std::size_t>, CornerSet>;
+
+Result<CornersFound> read_corners(const fs::path& file, std::span<const NamedTarget> targets,
+                                  const std::optional<CameraIntrinsics>& camera, std::vector<std::string>& notes) {
+  const auto table = read_corner_table(file, targets);
   if (!table) return std::unexpected(table.error());
-  const auto count = static_cast<std::size_t>(board.corners());
-  std::map<std::string, std::vector<std::optional<Eigen::Vector2d>>> found;
-  for (const CsvRow& row : table->rows) {
-    const auto corner = corner_from(*table, row, board, camera);
+  std::map<std::pair<std::string, std::size_t>, std::vector<std::optional<Eigen::Vector2d>>> found;
+  for (const CsvRow& row : table->csv.rows) {
+    const auto corner = corner_from(*table, row, targets, camera);
     if (!corner) return std::unexpected(corner.error());
-    auto& corners = found[corner->image];
-    corners.resize(count);
+    auto& corners = found[{corner->image, corner->target}];
+    corners.resize(static_cast<std::size_t>(targets[corner->target].board.corners()));
     auto& place = corners[static_cast<std::size_t>(corner->index)];
-    if (place)
-      return failure(Fault::kDataMalformed, "{}: this corner of '{}' a second time", table->place(row), corner->image);
+    if (place) {
+      return failure(Fault::kDataMalformed, "{}: this corner of '{}' a second time", table->csv.place(row),
+                     corner->image);
+    }
     place = corner->pixel;
   }
   constexpr std::size_t kPointsMin = 4;
-  std::map<std::string, CornerSet> usable;
-  for (const auto& [image, corners] : found) {
+  CornersFound usable;
+  for (const auto& [key, corners] : found) {
     const auto present = static_cast<std::size_t>(
         std::count_if(corners.begin(), corners.end(), [](const auto& c) { return c.has_value(); }));
-    if (present < (board.allows_partial_views() ? kPointsMin : count)) {
-      notes.push_back(fmt::format("{}: left out, {} of {} corners", image, present, count));
+    if (present < (targets[key.second].board.allows_partial_views() ? kPointsMin : corners.size())) {
+      notes.push_back(fmt::format("{}: left out, {} of {} corners", view_name(targets, key.first, key.second), present,
+                                  corners.size()));
       continue;
     }
-    CornerSet& set = usable[image];
+    CornerSet& set = usable[key];
     for (std::size_t i = 0; i < corners.size(); ++i) {
       if (!corners[i]) continue;
       set.corners_px.push_back(*corners[i]);
-      if (present < count) set.ids.push_back(static_cast<int>(i));
+      if (present < corners.size()) set.ids.push_back(static_cast<int>(i));
     }
   }
   return usable;
 }
 
+/// What a picture shows of one target. With several targets the pictures are the stations.
+void add_view(const RecordedPose& pose, std::size_t picture, std::size_t target, CornerSet points,
+              CalibrationDataset& data) {
+  const int station = data.targets.size() > 1 ? static_cast<int>(picture) : -1;
+  data.views.push_back(
+      {pose.base_T_flange, std::move(points.corners_px), std::move(points.ids), static_cast<int>(target), station});
+  data.names.push_back(view_name(data.targets, pose.image, target));
+  data.images.push_back(pose.image);
+}
+
 Status add_views_from_corners(const fs::path& folder, const std::vector<RecordedPose>& poses,
                               const std::optional<CameraIntrinsics>& camera, CalibrationDataset& data) {
-  auto corners = read_corners(folder / "corners.csv", data.board, camera, data.notes);
+  auto corners = read_corners(folder / "corners.csv", data.targets, camera, data.notes);
   if (!corners) return std::unexpected(corners.error());
-  for (const RecordedPose& pose : poses) {
-    const auto found = corners->find(pose.image);
-    if (found == corners->end()) {
-      data.notes.push_back(fmt::format("{}: left out, no whole board in corners.csv", pose.image));
-      continue;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t before = data.views.size();
+    for (std::size_t k = 0; k < data.targets.size(); ++k) {
+      const auto found = corners->find({poses[i].image, k});
+      if (found == corners->end()) continue;
+      add_view(poses[i], i, k, std::move(found->second), data);
+      corners->erase(found);
     }
-    data.views.push_back({pose.base_T_flange, found->second.corners_px, found->second.ids});
-    data.names.push_back(pose.image);
-    corners->erase(found);
+    if (data.views.size() > before) continue;
+    data.notes.push_back(fmt::format("{}: left out, no whole board in corners.csv", poses[i].image));
   }
-  for (const auto& [image, unused] : *corners)
-    data.notes.push_back(fmt::format("{}: left out, no row in poses.csv", image));
+  for (const auto& [key, unused] : *corners) {
+    data.notes.push_back(
+        fmt::format("{}: left out, no row in poses.csv", view_name(data.targets, key.first, key.second)));
+  }
   if (!camera) {
     // Only where the search for the camera's centre begins: the corners are taken to fill the picture evenly.
     Eigen::Vector2d low = Eigen::Vector2d::Constant(1e9), high = Eigen::Vector2d::Zero();
@@ -206,10 +266,27 @@ Status add_views_from_corners(const fs::path& folder, const std::vector<Recorded
   return {};
 }
 
+/// One target or more; the error says why there is none.
+Result<std::vector<TargetSighting>> sightings_of(GrayImage image, const std::vector<BoardSpec>& boards,
+                                                 const DetectionOptions& detection) {
+  if (boards.size() == 1) {  // what the detector of the one target says is worth reading
+    auto corners = detect_target(image, boards.front(), detection);
+    if (!corners) return std::unexpected(corners.error());
+    std::vector<TargetSighting> seen;
+    seen.push_back({0, std::move(*corners)});
+    return seen;
+  }
+  auto seen = detect_targets(image, boards, detection);
+  if (seen && seen->empty()) return failure(Fault::kBoardNotFound, "it shows none of {} targets", boards.size());
+  return seen;
+}
+
 Status add_views_from_images(const fs::path& folder, const std::vector<RecordedPose>& poses,
                              const std::optional<CameraIntrinsics>& camera, const DetectionOptions& detection,
                              CalibrationDataset& data) {
-  for (const RecordedPose& pose : poses) {
+  const std::vector<BoardSpec> boards = boards_of(data.targets);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const RecordedPose& pose = poses[i];
     const auto picture = read_gray_image(folder / pose.image);
     if (!picture) return std::unexpected(picture.error());
     if (data.camera.width == 0) {
@@ -221,13 +298,14 @@ Status add_views_from_images(const fs::path& folder, const std::vector<RecordedP
                      picture->height, camera ? "camera_info.yaml" : "the first image", data.camera.width,
                      data.camera.height);
     }
-    const auto corners = detect_target(picture->view(), data.board, detection);
-    if (!corners) {
-      data.notes.push_back(fmt::format("{}: left out, {}", pose.image, corners.error().detail()));
+    auto seen = sightings_of(picture->view(), boards, detection);
+    if (!seen) {
+      data.notes.push_back(fmt::format("{}: left out, {}", pose.image, seen.error().detail()));
       continue;
     }
-    data.views.push_back({pose.base_T_flange, corners->corners_px, corners->ids});
-    data.names.push_back(pose.image);
+    for (TargetSighting& sighting : *seen) {
+      add_view(pose, i, static_cast<std::size_t>(sighting.target), std::move(sighting.points), data);
+    }
   }
   if (data.views.empty()) {
     return failure(Fault::kBoardNotFound, "in none of {} images of {}", poses.size(), folder.string());
@@ -251,7 +329,7 @@ Result<CalibrationDataset> read_pair_dataset(const fs::path& folder) {
 }
 
 Status calibrate_camera(CalibrationDataset& data) {
-  const auto estimate = estimate_intrinsics(data.camera.width, data.camera.height, data.board, data.views);
+  const auto estimate = estimate_intrinsics(data.camera.width, data.camera.height, boards_of(data.targets), data.views);
   if (!estimate) return std::unexpected(estimate.error());
   data.camera = estimate->camera;
   data.intrinsics_estimated = true;
@@ -269,22 +347,42 @@ Status calibrate_camera(CalibrationDataset& data) {
 void settle_flips(CalibrationDataset& data) {
   std::vector<OpenView> open;
   for (const CalibrationView& view : data.views) {
-    const auto pose = estimate_board_pose(data.camera, data.board, view.corners_px);
+    const BoardSpec& board = data.targets[static_cast<std::size_t>(view.target)].board;
+    const auto pose = estimate_board_pose(data.camera, board, view.points());
     if (!pose) return;
-    open.push_back(open_view(data.board, view, *pose));
+    open.push_back(open_view(board, view, *pose));
   }
   const auto choices = settle_choices(open);
-  int turned = 0;
+  std::vector<int> turned(data.targets.size()), seen(data.targets.size());
   for (std::size_t i = 0; i < choices.size(); ++i) {
+    const auto target = static_cast<std::size_t>(data.views[i].target);
+    ++seen[target];
     if (!open[i].choices[choices[i]].reversed) continue;
     std::reverse(data.views[i].corners_px.begin(), data.views[i].corners_px.end());
-    ++turned;
+    ++turned[target];
   }
-  data.notes.push_back(fmt::format(
-      "a {}x{} board looks the same upside down: {} of {} views turned so that they agree with the arm's motion; a "
-      "board "
-      "of odd x even corners needs no guess",
-      data.board.inner_columns, data.board.inner_rows, turned, choices.size()));
+  for (std::size_t k = 0; k < data.targets.size(); ++k) {
+    const NamedTarget& target = data.targets[k];
+    if (target.board.is_orientation_unique()) continue;
+    data.notes.push_back(fmt::format(
+        "{}a {}x{} board looks the same upside down: {} of {} views turned so that they agree with the arm's motion; a "
+        "board of odd x even corners needs no guess",
+        target.name.empty() ? "" : target.name + ": ", target.board.inner_columns, target.board.inner_rows, turned[k],
+        seen[k]));
+  }
+}
+
+/// Targets that tell little or nothing.
+void note_rare_targets(CalibrationDataset& data) {
+  for (std::size_t k = 0; k < data.targets.size() && data.targets.size() > 1; ++k) {
+    const auto views = std::count_if(data.views.begin(), data.views.end(),
+                                     [&](const auto& v) { return v.target == static_cast<int>(k); });
+    if (views == 0) data.notes.push_back(fmt::format("{}: dropped, no view shows it", data.targets[k].name));
+    if (views == 1) {
+      data.notes.push_back(fmt::format("{}: seen in one view, which tells where it is and nothing of the hand-eye",
+                                       data.targets[k].name));
+    }
+  }
 }
 
 }  // namespace
@@ -294,9 +392,10 @@ Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder, cons
   if (!fs::is_directory(folder, ignored)) return failure(Fault::kDataMissing, "{}: no such folder", folder.string());
   if (!is_there(folder / "poses.csv") && is_there(folder / "pairs.csv")) return read_pair_dataset(folder);
   CalibrationDataset data;
-  const auto board = read_board(folder / "board.yaml");
-  if (!board) return std::unexpected(board.error());
-  data.board = *board;
+  auto targets = read_targets(folder / "board.yaml");
+  if (!targets) return std::unexpected(targets.error());
+  data.targets = std::move(*targets);
+  data.board = data.targets.front().board;
   std::optional<CameraIntrinsics> camera;
   if (is_there(folder / "camera_info.yaml")) {
     const auto info = read_camera_info(folder / "camera_info.yaml");
@@ -314,7 +413,10 @@ Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder, cons
   if (!camera) {
     if (const Status calibrated = calibrate_camera(data); !calibrated) return std::unexpected(calibrated.error());
   }
-  if (!with_corners && !data.board.is_orientation_unique()) settle_flips(data);
+  const bool any_flips = std::any_of(data.targets.begin(), data.targets.end(),
+                                     [](const NamedTarget& t) { return !t.board.is_orientation_unique(); });
+  if (!with_corners && any_flips) settle_flips(data);
+  note_rare_targets(data);
   return data;
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithms/calibration/calibration_view.hpp"
-#include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target_set.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 
@@ -24,24 +24,30 @@ struct RecordedPose {
 /// What a calibration is solved from. `views` for images and corners, `pairs` for pairs.csv.
 struct CalibrationDataset {
   CalibrationSource source = CalibrationSource::kImages;
-  BoardSpec board;  ///< with pairs.csv: what board.yaml says, or unset when there is none
+  BoardSpec board;                   ///< the first target; with pairs.csv: what board.yaml says, or unset without one
+  std::vector<NamedTarget> targets;  ///< all of them; a board.yaml of one target gives it no name
   CameraIntrinsics camera;
   bool intrinsics_estimated = false;  ///< no camera_info.yaml: calibrated from the same images (Zhang 2000)
   double intrinsics_rms_px = 0;       ///< of that calibration
   std::vector<CalibrationView> views;
-  std::vector<std::string> names;  ///< one for each view
+  std::vector<std::string> names;   ///< one for each view
+  std::vector<std::string> images;  ///< the picture that each view is of; those of one picture are one station
   std::vector<PosePair> pairs;
   std::vector<std::string> notes;  ///< for people: images left out and why
 };
 
 /// Reads the folder; corners.csv is preferred to images, pairs.csv is used when there is no poses.csv. Images in which
-/// the board is not found are left out with a note. Quaternions within 1e-3 of unit length are normalised, others
-/// refused.
+/// the board is not found are left out with a note. With several targets (board.yaml with a list `boards`) each picture
+/// gives a view of each target that it shows, and corners.csv has a column `target` with the name. Quaternions within
+/// 1e-3 of unit length are normalised, others refused.
 /// @return kDataMissing or kDataMalformed, naming file and line
 [[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder,
                                                                   const DetectionOptions& detection = {});
 
-/// board.yaml alone. @return kDataMissing, kDataMalformed
+/// board.yaml alone: one target without a name, or those of its list `boards`, each the same keys and a `name`, of
+/// which none can be taken for another (check_distinct). @return kDataMissing, kDataMalformed
+[[nodiscard]] Result<std::vector<NamedTarget>> read_targets(const std::filesystem::path& file);
+/// The same for a file of one target. @return also kDataMalformed for several
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);
 
 /// The text of a board.yaml.

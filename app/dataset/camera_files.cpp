@@ -75,6 +75,25 @@ BoardSpec parse_board(const YAML::Node& root) {
   return *board;
 }
 
+std::vector<NamedTarget> parse_targets(const YAML::Node& root) {
+  const YAML::Node list = root["boards"];
+  if (!list) return {{std::string(), parse_board(root)}};
+  const int line = list.Mark().line + 1;
+  if (root["type"]) throw Complaint{line, "'boards' and a board beside them: put that one into the list, too"};
+  if (!list.IsSequence()) throw Complaint{line, "'boards' is not a list; each entry begins with '- name: ...'"};
+  std::vector<NamedTarget> targets;
+  for (const YAML::Node& entry : list) {
+    if (!entry.IsMap()) throw Complaint{entry.Mark().line + 1, "an entry of 'boards' is not a list of keys and values"};
+    targets.push_back({value_of<std::string>(entry, "name"), parse_board(entry)});
+    // After each one, so that the complaint has the line of the second of two that do not go together.
+    if (const Status distinct = check_distinct(targets); !distinct) {
+      throw Complaint{entry.Mark().line + 1, std::string(distinct.error().detail())};
+    }
+  }
+  if (targets.empty()) throw Complaint{line, "no board in the list 'boards'"};
+  return targets;
+}
+
 std::vector<double> numbers(const YAML::Node& root, const char* key, std::size_t least, std::size_t most) {
   const YAML::Node node = root[key];
   if (!node || !node.IsMap()) throw Complaint{root.Mark().line + 1, fmt::format("no matrix '{}'", key)};
@@ -132,7 +151,16 @@ std::string board_yaml(const BoardSpec& board) {
   return text;
 }
 
-Result<BoardSpec> read_board(const std::filesystem::path& file) { return load<BoardSpec>(file, parse_board); }
+Result<std::vector<NamedTarget>> read_targets(const std::filesystem::path& file) {
+  return load<std::vector<NamedTarget>>(file, parse_targets);
+}
+
+Result<BoardSpec> read_board(const std::filesystem::path& file) {
+  const auto targets = read_targets(file);
+  if (!targets) return std::unexpected(targets.error());
+  if (targets->size() == 1) return targets->front().board;
+  return failure(Fault::kDataMalformed, "{}: {} boards where one is wanted", file.filename().string(), targets->size());
+}
 
 Result<CameraIntrinsics> read_camera_info(const std::filesystem::path& file) {
   return load<CameraIntrinsics>(file, parse_camera_info);

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "algorithms/vision/camera_model.hpp"
+#include "algorithms/vision/rotation.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/dataset/gray_image_file.hpp"
 #include "app/report/html.hpp"
@@ -23,6 +25,8 @@ GrayPicture picture_of(const std::filesystem::path& file, const CameraIntrinsics
 
 CalibrationViewRecord record_of_view(const CalibrationDataset& data, const HandEyeResult& result, std::size_t i) {
   const CalibrationView& view = data.views[i];
+  const BoardSpec& board = data.targets[static_cast<std::size_t>(view.target)].board;
+  const TargetPose& target = result.targets[static_cast<std::size_t>(view.target)];
   CalibrationViewRecord r;
   r.name = data.names[i];
   r.base_T_flange = view.base_T_flange;
@@ -30,10 +34,11 @@ CalibrationViewRecord record_of_view(const CalibrationDataset& data, const HandE
   r.detected_ids = view.ids;
   r.used = result.fits[i].used;
   if (i < result.holdout_px.size()) r.holdout_px = result.holdout_px[i];
-  const auto camera_T_board = (view.base_T_flange * result.flange_T_camera).inverse() * result.base_T_board;
+  if (target.views == 0) return r;
+  const auto camera_T_board = (view.base_T_flange * result.flange_T_camera).inverse() * target.base_T_board;
   double squared = 0;
   for (std::size_t c = 0; c < view.corners_px.size(); ++c) {
-    const auto pixel = project(data.camera, camera_T_board * data.board.corner(point_of(view.ids, c)));
+    const auto pixel = project(data.camera, camera_T_board * board.corner(point_of(view.ids, c)));
     r.reprojected_px.push_back(pixel.value_or(Eigen::Vector2d(-1, -1)));
     squared += (view.corners_px[c] - r.reprojected_px.back()).squaredNorm();
   }
@@ -43,8 +48,47 @@ CalibrationViewRecord record_of_view(const CalibrationDataset& data, const HandE
 
 std::string data_text(const CalibrationDataset& data) {
   if (data.source == CalibrationSource::kPairs) return fmt::format("{} pose pairs", data.pairs.size());
-  return fmt::format("{} views of a board: {}; {}", data.views.size(), describe(data.board),
+  return fmt::format("{}; {}", views_text(data),
                      data.source == CalibrationSource::kImages ? "corners found in the images" : "corners as given");
+}
+
+/// Where each target is, and where it is from the others.
+std::string targets_section(const RunRecord& record) {
+  if (record.target_names.size() < 2) return {};
+  const HandEyeResult& h = *record.hand_eye;
+  HtmlTable table(
+      {"target", "from", "views", "x mm", "y mm", "z mm", "± mm, 1σ", "roll °", "pitch °", "yaw °", "± mrad, 1σ"}, 2);
+  const auto row = [&](const std::string& name, const std::string& from, std::string views, const Pose& pose,
+                       const Matrix6d& covariance) {
+    const Eigen::Vector3d t = pose.translation() * 1e3;
+    const Eigen::Vector3d rpy = roll_pitch_yaw(pose.linear()) * (180 / std::numbers::pi);
+    const auto worst = [&](Eigen::Index first) {
+      return std::sqrt(std::max(0.0, covariance.diagonal().segment<3>(first).maxCoeff())) * 1e3;
+    };
+    table.row({name, from, std::move(views), fmt::format("{:.2f}", t.x()), fmt::format("{:.2f}", t.y()),
+               fmt::format("{:.2f}", t.z()), fmt::format("{:.3f}", worst(0)), fmt::format("{:.3f}", rpy.x()),
+               fmt::format("{:.3f}", rpy.y()), fmt::format("{:.3f}", rpy.z()), fmt::format("{:.3f}", worst(3))});
+  };
+  for (std::size_t k = 0; k < h.targets.size(); ++k) {
+    const TargetPose& target = h.targets[k];
+    if (target.views == 0) {
+      table.row({record.target_names[k], "not solved: no usable view", "0", "", "", "", "", "", "", "", ""});
+    } else {
+      row(record.target_names[k], "base", fmt::format("{}", target.views), target.base_T_board.pose(),
+          target.covariance);
+    }
+  }
+  for (std::size_t k = 0; k < h.targets.size(); ++k) {
+    for (std::size_t other = k + 1; other < h.targets.size(); ++other) {
+      const auto seen = mutual_pose(h.targets, h.joint_covariance, static_cast<int>(k), static_cast<int>(other));
+      if (seen) row(record.target_names[other], record.target_names[k], "", seen->pose.pose(), seen->covariance);
+    }
+  }
+  std::string body = "<div class=\"scroll\">" + table.html("dense") + "</div>\n";
+  body += paragraph(
+      "The sigma is that of the worst axis. A target in one view alone is placed by it and tells nothing of where the "
+      "camera sits.");
+  return section("targets", "Where the targets are", body);
 }
 
 std::string data_section(const CalibrationDataset& data) {
@@ -83,6 +127,13 @@ std::string view_table(const RunRecord& record, const CalibrationDataset& data) 
 
 }  // namespace
 
+std::string views_text(const CalibrationDataset& data) {
+  if (data.targets.size() == 1) return fmt::format("{} views of a board: {}", data.views.size(), describe(data.board));
+  std::string text = fmt::format("{} views of {} targets", data.views.size(), data.targets.size());
+  for (const NamedTarget& target : data.targets) text += fmt::format("; {}: {}", target.name, describe(target.board));
+  return text;
+}
+
 RunRecord record_of_dataset(const std::filesystem::path& folder, const CalibrationDataset& data,
                             const HandEyeResult& result, const HandEyeOptions& options) {
   RunRecord record;
@@ -95,13 +146,16 @@ RunRecord record_of_dataset(const std::filesystem::path& folder, const Calibrati
   record.solver = solver_name(options.solver);
   const bool pairs = data.source == CalibrationSource::kPairs;
   const std::vector<PosePair> used =
-      pairs ? used_pairs(data.pairs, result) : used_pairs(data.camera, data.board, data.views, result);
+      pairs ? used_pairs(data.pairs, result) : used_pairs(data.camera, boards_of(data.targets), data.views, result);
   record.comparison = compare_solvers(used, result, options);
   if (pairs) return record;
   record.intrinsics = data.camera;
+  if (data.targets.size() > 1) {
+    for (const NamedTarget& target : data.targets) record.target_names.push_back(target.name);
+  }
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     record.calibration_views.push_back(record_of_view(data, result, i));
-    if (i < kViewsShownMax) record.calibration_views.back().picture = picture_of(folder / data.names[i], data.camera);
+    if (i < kViewsShownMax) record.calibration_views.back().picture = picture_of(folder / data.images[i], data.camera);
   }
   return record;
 }
@@ -116,7 +170,7 @@ std::string dataset_report_html(const RunRecord& record, const CalibrationDatase
   html += "<nav><a href=\"#hand-eye\">Hand-eye</a><a href=\"#residuals\">Residuals</a>";
   if (!record.calibration_views.empty()) html += "<a href=\"#calibration-views\">Views</a>";
   html += "<a href=\"#solvers\">Solvers</a><a href=\"#data\">Data</a></nav>\n";
-  html += summary_section(record) + hand_eye_section(record) + view_table(record, data);
+  html += summary_section(record) + hand_eye_section(record) + targets_section(record) + view_table(record, data);
   html += calibration_views_section(record) + solver_comparison_section(record) + data_section(data);
   return html + "</main>\n</body>\n</html>\n";
 }

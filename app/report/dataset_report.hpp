@@ -9,6 +9,9 @@
 
 namespace firstlook {
 
+/// "8 views of a board: checkerboard, 9x6 ...", or of several targets with their names.
+[[nodiscard]] std::string views_text(const CalibrationDataset& data);
+
 /// What the pages tell: verdict, hand-eye, the solvers side by side, and each view with the corners found and
 /// predicted; the pictures of as many views as a page shows are read again from `folder` where they are there.
 [[nodiscard]] RunRecord record_of_dataset(const std::filesystem::path& folder, const CalibrationDataset& data,

@@ -123,6 +123,35 @@ json solver_comparison_json(const SolverComparison& comparison) {
           {"solvers", std::move(solvers)}};
 }
 
+void describe_targets(const HandEyeResult& result, std::span<const std::string> names, json& hand_eye) {
+  const auto with_sigmas = [](const Pose& pose, const Matrix6d& covariance) {
+    const Vector6d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+    json object = transform_json(pose);
+    object["sigma_translation_mm"] = array_of(Eigen::Vector3d(sigma.head<3>() * 1e3));
+    object["sigma_rotation_mrad"] = array_of(Eigen::Vector3d(sigma.tail<3>() * 1e3));
+    return object;
+  };
+  json targets = json::array(), mutual = json::array();
+  for (std::size_t k = 0; k < result.targets.size(); ++k) {
+    const TargetPose& target = result.targets[k];
+    targets.push_back({{"name", names[k]},
+                       {"views", target.views},
+                       {"base_T_board", target.views > 0 ? with_sigmas(target.base_T_board.pose(), target.covariance)
+                                                         : json(nullptr)}});
+    for (std::size_t other = k + 1; other < result.targets.size(); ++other) {
+      const auto seen =
+          mutual_pose(result.targets, result.joint_covariance, static_cast<int>(k), static_cast<int>(other));
+      if (!seen) continue;
+      json object = with_sigmas(seen->pose.pose(), seen->covariance);
+      object["from"] = names[k];
+      object["to"] = names[other];
+      mutual.push_back(std::move(object));
+    }
+  }
+  hand_eye["targets"] = std::move(targets);
+  hand_eye["mutual_poses"] = std::move(mutual);
+}
+
 void describe_stored(const VerifiedCalibration& verified, json& hand_eye) {
   hand_eye["source"] = "stored";
   hand_eye["views_given"] = verified.calibration.views_given;

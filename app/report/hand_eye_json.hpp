@@ -2,6 +2,8 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
 #include <string_view>
 
 #include "algorithms/calibration/solver_comparison.hpp"
@@ -17,6 +19,10 @@ namespace firstlook {
 /// SI units unless the name says otherwise; numbers that do not apply (no corners) are null.
 [[nodiscard]] nlohmann::json hand_eye_json(const HandEyeResult& result, std::string_view parent_link,
                                            std::string_view solver);
+
+/// Says where several targets are: `targets[]` with each one's pose in base and its sigmas (along base's axes; null
+/// when no view shows it), and `mutual_poses[]` of every two that were solved (sigmas along the axes of `from`).
+void describe_targets(const HandEyeResult& result, std::span<const std::string> names, nlohmann::json& hand_eye);
 
 /// Every solver on the same random parts of the views: for each its name, how many were solved, why the first was not,
 /// and for each figure minimum, lower quartile, median, upper quartile and maximum (null when none was solved).

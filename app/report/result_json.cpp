@@ -112,6 +112,11 @@ std::string result_json(const RunRecord& record) {
   if (record.hand_eye && record.comparison) {
     json["hand_eye"]["solver_comparison"] = solver_comparison_json(*record.comparison);
   }
+  if (record.hand_eye && record.target_names.size() > 1) {
+    nlohmann::json hand_eye = json["hand_eye"];
+    describe_targets(*record.hand_eye, record.target_names, hand_eye);
+    json["hand_eye"] = hand_eye;
+  }
   json["mapping"] = record.mapping ? mapping_json(*record.mapping) : Json(nullptr);
   json["safety"] = record.safety ? safety_json(*record.safety) : Json(nullptr);
   json["memory"] = record.memory ? memory_json(*record.memory) : Json(nullptr);

@@ -232,6 +232,7 @@ struct RunRecord {
   std::optional<VerifiedCalibration> verified;  ///< where hand_eye came from, when not solved in this run
   std::string solver;                           ///< closed form that started it
   std::optional<SolverComparison> comparison;   ///< of recorded data alone
+  std::vector<std::string> target_names;        ///< by HandEyeResult::targets; empty when there is but one target
   CameraIntrinsics intrinsics;                  ///< of the colour camera; width 0: unknown, no camera_info.yaml
   Transform<Camera, Depth> camera_T_depth;
   std::vector<CalibrationViewRecord> calibration_views;

@@ -348,7 +348,7 @@ TEST_CASE("calibrate --out leaves what a run leaves of its calibration", "[app][
        {"easy_handeye2.calib", "camera_transform.launch", "camera_transform.launch.py", "camera.xacro"}) {
     CHECK(fs::file_size(out / "ros" / name) > 200);
   }
-  CHECK(std::distance(fs::recursive_directory_iterator(out), fs::recursive_directory_iterator()) == 8);
+  CHECK(std::distance(fs::recursive_directory_iterator(out), fs::recursive_directory_iterator()) == 10);
 }
 
 TEST_CASE("calibrate --out: pose pairs know no camera, and nothing for ROS is made of a rejected one",

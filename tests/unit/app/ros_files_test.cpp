@@ -14,6 +14,7 @@
 #include <set>
 #include <sstream>
 
+#include "algorithms/vision/rotation.hpp"
 #include "app/report/yaml_number.hpp"
 #include "platform/core/random.hpp"
 #include "tests/support/moveit_scene_reader.hpp"
