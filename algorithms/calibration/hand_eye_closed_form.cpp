@@ -111,8 +111,9 @@ AxXbResidual ax_xb_residual_all_pairs(std::span<const PosePair> pairs,
 AxXbResidual ax_xb_residual_consecutive(std::span<const PosePair> pairs,
                                         const Transform<Flange, Camera>& flange_T_camera) {
   std::vector<Motion> motions;
-  for (std::size_t i = 1; i < pairs.size(); ++i) {
-    if (pairs[i - 1].target == pairs[i].target) motions.push_back(motion_between(pairs[i - 1], pairs[i]));
+  for (int k = 0; k < target_count(pairs); ++k) {
+    const std::vector<PosePair> own = pairs_of_target(pairs, k);
+    for (std::size_t i = 1; i < own.size(); ++i) motions.push_back(motion_between(own[i - 1], own[i]));
   }
   return residual_of(motions, flange_T_camera);
 }

@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<std::string_view, kPoseFigures> kNames = {"x",   "y",  "z",  "roll", "pitch",
                                                                "yaw", "qx", "qy", "qz",   "qw"};
 /// Pairs up to which all subsets are solved.
-constexpr double kPairsQuick = 40;
+constexpr double kPairsQuick = 60;
 /// What a box needs to have quartiles that mean something.
 constexpr int kSubsetsMin = 5;
 

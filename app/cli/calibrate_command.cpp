@@ -72,8 +72,8 @@ void print_text(const HandEyeResult& r) {
   fmt::print("arm sigma        {:.2f} mm  {:.2f} mrad for each axis\n", r.arm_sigma.translation_m * 1e3,
              r.arm_sigma.rotation_rad * 1e3);
   if (!r.from_pairs) {
-    fmt::print("reprojection     {:.3f} px RMS in {} views; held out {:.2f} px\n", r.reprojection_rms_px, r.views,
-               r.holdout_rms_px);
+    fmt::print("reprojection     {:.3f} px RMS in {} {}; held out {:.2f} px\n", r.reprojection_rms_px, r.views,
+               r.targets.size() > 1 ? "places of the arm" : "views", r.holdout_rms_px);
   }
   fmt::print("held out         board seen off by {:.2f} mm RMS\n", r.holdout_rms_m * 1e3);
   fmt::print("70 % subsets     spread {:.2f} mm  {:.2f} mrad RMS\n", r.subset_spread_m * 1e3,

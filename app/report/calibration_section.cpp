@@ -61,7 +61,8 @@ std::string quality_table(const RunRecord& record) {
   const auto gated = std::count_if(h.fits.begin(), h.fits.end(), [](const ViewFit& fit) { return !fit.used; });
   const auto near = std::count_if(record.calibration_views.begin(), record.calibration_views.end(),
                                   [](const CalibrationViewRecord& view) { return !view.counted; });
-  table.row({"views", fmt::format("{} used, {} left out as wrong, {} too near another", h.views, gated, near),
+  table.row({h.targets.size() > 1 ? "places of the arm" : "views",
+             fmt::format("{} used, {} left out as wrong, {} too near another", h.views, gated, near),
              fmt::format("closed form: {}", record.solver)});
   return table.html();
 }

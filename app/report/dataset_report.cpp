@@ -103,6 +103,14 @@ std::string data_section(const CalibrationDataset& data) {
   return section("data", "What it was solved from", body);
 }
 
+/// "25 of 26 views", "7 of 8 pose pairs", "16 of 16 views of 2 targets at 12 places of the arm".
+std::string solved_from_text(const HandEyeResult& result) {
+  const auto used = std::count_if(result.fits.begin(), result.fits.end(), [](const ViewFit& fit) { return fit.used; });
+  std::string text = fmt::format("{} of {} {}", used, result.fits.size(), result.from_pairs ? "pose pairs" : "views");
+  if (result.targets.size() < 2) return text;
+  return text + fmt::format(" of {} targets at {} places of the arm", result.targets.size(), result.views);
+}
+
 /// What each view is off by, in pixels and as a deviation of the arm.
 std::string view_table(const RunRecord& record, const CalibrationDataset& data) {
   const HandEyeResult& h = *record.hand_eye;
@@ -139,8 +147,8 @@ RunRecord record_of_dataset(const std::filesystem::path& folder, const Calibrati
   RunRecord record;
   const bool accepted = result.verdict == Verdict::kAccepted;
   record.outcome = accepted ? Outcome::kDone : Outcome::kCalibrationRejected;
-  record.reason = fmt::format("hand-eye calibration {} from {} of {} {}", accepted ? "accepted" : "rejected",
-                              result.views, result.fits.size(), result.from_pairs ? "pose pairs" : "views");
+  record.reason =
+      fmt::format("hand-eye calibration {} from {}", accepted ? "accepted" : "rejected", solved_from_text(result));
   record.seed = static_cast<std::int64_t>(options.seed);
   record.hand_eye = result;
   record.solver = solver_name(options.solver);

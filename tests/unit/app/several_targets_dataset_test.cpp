@@ -25,7 +25,7 @@ struct Folder {
     fs::remove_all(path);
     fs::create_directories(path);
   }
-  ~Folder() {}
+  ~Folder() { fs::remove_all(path); }
   Folder(const Folder&) = delete;
   Folder& operator=(const Folder&) = delete;
   void write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
