@@ -12,6 +12,7 @@ int target_count(std::span<const PosePair> pairs) {
 
 std::vector<PosePair> pairs_of_target(std::span<const PosePair> pairs, int target) {
   std::vector<PosePair> own;
+  own.reserve(pairs.size());
   for (const PosePair& pair : pairs) {
     if (pair.target == target) own.push_back(pair);
   }
@@ -20,6 +21,7 @@ std::vector<PosePair> pairs_of_target(std::span<const PosePair> pairs, int targe
 
 std::vector<std::size_t> stations_of(std::span<const PosePair> pairs) {
   std::vector<std::size_t> stations;
+  stations.reserve(pairs.size());
   std::size_t count = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     std::size_t same = i;

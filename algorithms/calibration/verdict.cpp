@@ -36,6 +36,7 @@ struct Validation {
   /// The views from some of the stations.
   [[nodiscard]] Indices views_of(const std::function<bool(std::size_t)>& has_station) const {
     Indices views;
+    views.reserve(pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       if (has_station(station[i])) views.push_back(i);
     }
@@ -87,6 +88,7 @@ int spread_of_subsets(const Validation& validation, const HandEyeOptions& option
   ViewSubsets subsets(validation.stations, options.subset_share, options.seed);
   double squared_m = 0, squared_rad = 0;
   result.subset_solutions.clear();
+  result.subset_solutions.reserve(static_cast<std::size_t>(std::max(0, options.subset_solves)));
   for (int i = 0; i < options.subset_solves; ++i) {
     const Indices drawn = subsets.next();
     const auto is_drawn = [&](std::size_t s) { return std::binary_search(drawn.begin(), drawn.end(), s); };

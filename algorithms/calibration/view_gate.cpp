@@ -31,12 +31,14 @@ std::vector<double> medians_for(std::span<const PosePair> pairs, std::span<const
   };
   for (std::size_t i = 0; i < pairs.size(); ++i) of(pairs[i]).push_back(values[i]);
   std::vector<double> repeated;
+  repeated.reserve(values.size());
   for (const std::vector<double>& group : own) {
     if (group.size() > 1 || own.size() == 1) repeated.insert(repeated.end(), group.begin(), group.end());
   }
   if (repeated.empty()) repeated.assign(values.begin(), values.end());
   const double all = median(std::move(repeated));
   std::vector<double> medians;
+  medians.reserve(values.size() + 1);
   for (const PosePair& pair : pairs) {
     const std::vector<double>& group = of(pair);
     medians.push_back(own.size() == 1 || group.size() < kOwnMedianMin ? all : std::max(all, median(group)));
