@@ -154,7 +154,7 @@ std::vector<StationNormal> station_normals(const Fit& fit) {
   return stations;
 }
 
-/// One board has equations of fixed size, a third faster.
+/// One board has equations of fixed size, whose matrices take nothing from the heap.
 std::optional<LinearSolution> solve_linear_of(const Fit& fit, const ArmSigma& sigma) {
   if (fit.layout.boards.size() == 1) return solve_linear(fit.bundle.views, fit.state.deviations, sigma);
   return solve_linear(station_normals(fit), fit.state.deviations, sigma);

@@ -45,7 +45,7 @@ struct SolverComparison {
 /// Solves `options.subset_solves` subsets with every solver, the same subsets for all; those of the refinement are
 /// `result.subset_solutions`. Angles are given within half a turn of the result's, quaternions on its side. Above 60
 /// pairs fewer subsets are solved, five at least, since a solve takes the square of their number: 0.3 s for 25 pairs,
-/// 1.7 s from 60 to 250.
+/// about 1.3 s from 60 to 250.
 [[nodiscard]] SolverComparison compare_solvers(std::span<const PosePair> pairs, const HandEyeResult& result,
                                                const HandEyeOptions& options);
 
