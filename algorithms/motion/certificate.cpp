@@ -17,14 +17,17 @@ struct Wanted {
 };
 
 /// Lower bound over a piece of a capsule's axis of the margin of its points, refined until it is enough or the piece is
-/// short. Along a segment the depth in the (convex) zone is smallest at an end; the field is read in the middle and can
-/// fall by half the length towards the ends. A bound of a whole piece holds for its halves too (`inherited`), so that
-/// whether the result is enough does not depend on what is asked for.
+/// short. Along a segment the depth in the (convex) zone is smallest at an end; distances to voxels, those of the field
+/// and those that the zone lost, are read in the middle and can fall by half the length towards the ends. A bound of a
+/// whole piece holds for its halves too (`inherited`), so that whether the result is enough does not depend on what is
+/// asked for.
 double axis_margin(const FreeSpace& space, const Clearance& need, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                    double length_m, const Wanted& wanted, double inherited) {
-  double bound = std::max(inherited, std::min(space.zone_margin_m(a, need), space.zone_margin_m(b, need)));
-  if (bound >= wanted.enough || space.field == nullptr) return bound;
   const Eigen::Vector3d middle = (a + b) / 2;
+  const double in_zone = std::min(space.zone_surface_margin_m(a, need), space.zone_surface_margin_m(b, need));
+  double bound = inherited;
+  if (in_zone > bound) bound = std::max(bound, std::min(in_zone, space.revoked_margin_m(middle, need) - length_m / 2));
+  if (bound >= wanted.enough || (space.field == nullptr && space.revoked == nullptr)) return bound;
   bound = std::max(bound, space.field_margin_m(middle, need) - length_m / 2);
   if (bound >= wanted.enough || length_m <= kAxisSpacing_m) return bound;
   const double first = axis_margin(space, need, a, middle, length_m / 2, wanted, bound);

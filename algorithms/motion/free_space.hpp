@@ -50,11 +50,18 @@ struct FreeSpace {
   [[nodiscard]] double field_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {
     return (field != nullptr ? field->distance_m(p) : 0.0) - need.voxels_m;
   }
-  /// Distance from p to the outside of the safe zone, beyond what is required; -infinity when the zone does not count.
+  /// Distance from p to the surface of the safe zone, beyond what is required; -infinity when the zone does not count.
+  /// The zone is convex: along a straight line this is smallest at an end.
+  [[nodiscard]] double zone_surface_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {
+    return zone_intact ? zone.depth_m(p) - need.surface_m : -std::numeric_limits<double>::infinity();
+  }
+  /// Distance from p to the revoked voxels of the zone, beyond what is required; +infinity without any.
+  [[nodiscard]] double revoked_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {
+    return revoked != nullptr ? revoked->distance_m(p) - need.voxels_m : std::numeric_limits<double>::infinity();
+  }
+  /// Distance from p to what the safe zone does not call free, beyond what is required.
   [[nodiscard]] double zone_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {
-    if (!zone_intact) return -std::numeric_limits<double>::infinity();
-    const double surface = zone.depth_m(p) - need.surface_m;
-    return revoked != nullptr ? std::min(surface, revoked->distance_m(p) - need.voxels_m) : surface;
+    return std::min(zone_surface_margin_m(p, need), revoked_margin_m(p, need));
   }
   /// Distance from p to the nearest keep-out, beyond what is required; +infinity without any.
   [[nodiscard]] double keep_out_margin_m(const Eigen::Vector3d& p, const Clearance& need) const {

@@ -15,12 +15,14 @@ struct Case {
   const char* name;
   bool zone_intact;
   bool keep_outs;
+  int taken = 0;  ///< voxels that hits took from the zone
 };
 
-FreeSpace space_of(const RandomCell& cell, const Case& c) {
+FreeSpace space_of(const RandomCell& cell, const Case& c, const RandomCell* zone_left = nullptr) {
   FreeSpace space;
   space.field = &cell.field;
   space.zone_intact = c.zone_intact;
+  if (zone_left != nullptr) space.revoked = &zone_left->field;
   if (c.keep_outs) {
     space.keep_out_boxes.push_back({{0.3, -0.2, 0.1}, {0.5, 0.3, 0.4}});
     space.keep_out_planes.push_back({Eigen::Vector3d(-1, 0.2, 0).normalized(), -0.6});
@@ -40,11 +42,13 @@ TEST_CASE("dense sampling confirms every certificate, and what has room is certi
   int segments = 0;
   int certified = 0;
   int roomy = 0;
-  for (const Case& c :
-       {Case{"map alone", false, false}, Case{"map and zone", true, false}, Case{"keep-outs", true, true}}) {
+  for (const Case& c : {Case{"map alone", false, false}, Case{"map and zone", true, false},
+                        Case{"keep-outs", true, true}, Case{"hits in the zone", true, false, 25}}) {
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-      const RandomCell cell(seed, 8);
-      const FreeSpace space = space_of(cell, c);
+      RandomCell cell(seed, 8);
+      const RandomCell left = take_from_zone(cell, seed, c.taken);
+      const RandomCell* const zone_left = c.taken > 0 ? &left : nullptr;
+      const FreeSpace space = space_of(cell, c, zone_left);
       for (int i = 0; i < 130; ++i) {
         Body body = bodies[seed % 3];
         if (i % 3 == 0) body.self_pairs.clear();  // their margins are small everywhere and would hide the others
@@ -62,7 +66,7 @@ TEST_CASE("dense sampling confirms every certificate, and what has room is certi
         constexpr int kSteps = 24;
         for (int k = 0; k <= kSteps; ++k) {
           const double t = static_cast<double>(k) / kSteps;
-          const double m = sampled_margin_m(arm, body, cell, space, kNeed, interpolate(from, to, t), 0.025);
+          const double m = sampled_margin_m(arm, body, cell, space, kNeed, interpolate(from, to, t), 0.025, zone_left);
           if (m < lowest) lowest = m, lowest_at = t;
           if (m < 0 && !proof.certified()) break;
         }
@@ -73,7 +77,7 @@ TEST_CASE("dense sampling confirms every certificate, and what has room is certi
         } else {
           // Where it says that it failed there is little room: axis spacing and the field's bound, no more.
           const double there =
-              sampled_margin_m(arm, body, cell, space, kNeed, interpolate(from, to, proof.fraction), 0.025);
+              sampled_margin_m(arm, body, cell, space, kNeed, interpolate(from, to, proof.fraction), 0.025, zone_left);
           REQUIRE(there < 0.03);
           REQUIRE(proof.margin_m < kMarginMin_m);
           REQUIRE(proof.capsule >= 0);
@@ -97,14 +101,17 @@ TEST_CASE("the margin of a configuration is a tight lower bound") {
   double gap_sum = 0;
   int count = 0;
   for (std::uint64_t seed = 11; seed <= 14; ++seed) {
-    const RandomCell cell(seed, 8);
-    const FreeSpace space = space_of(cell, {"", seed % 2 == 0, seed % 2 == 0});
+    RandomCell cell(seed, 8);
+    const Case c{"", seed % 2 == 0, seed % 2 == 0, seed % 4 < 2 ? 0 : 25};
+    const RandomCell left = take_from_zone(cell, seed, c.taken);
+    const RandomCell* const zone_left = c.taken > 0 ? &left : nullptr;
+    const FreeSpace space = space_of(cell, c, zone_left);
     for (int i = 0; i < 400; ++i) {
       const JointVector q = random_joints(random, 3.1);
       const double margin = configuration_margin(arm, body, space, kNeed, q);
       CHECK(configuration_is_free(arm, body, space, kNeed, q, 0) == (margin >= 0));
       CHECK(configuration_is_free(arm, body, space, kNeed, q, -0.03) == (margin >= -0.03));
-      const double sampled = sampled_margin_m(arm, body, cell, space, kNeed, q, 0.01);
+      const double sampled = sampled_margin_m(arm, body, cell, space, kNeed, q, 0.01, zone_left);
       REQUIRE(std::min(margin, kSampledMax_m) <= sampled + 1e-9);
       if (margin < -0.05 || margin > kSampledMax_m) continue;  // inside an obstacle distances are cut at zero
       gap_sum += sampled - margin;

@@ -60,6 +60,21 @@ struct RandomCell {
   }
 };
 
+/// Takes single voxels away in the safe zone, as hits do: from `cell`, and from what remains, which is returned.
+inline RandomCell take_from_zone(RandomCell& cell, std::uint64_t seed, int voxels) {
+  RandomCell left(seed, 0);
+  Random random(seed, 78);
+  for (int i = 0; i < voxels; ++i) {
+    const double angle = random.uniform(0, 2 * std::numbers::pi);
+    const double away = random.uniform(0.3, 0.48);
+    const Eigen::Vector3d p(away * std::cos(angle), away * std::sin(angle), random.uniform(0.0, 1.1));
+    cell.free[cell.grid.index(cell.grid.voxel(p))] = left.free[left.grid.index(left.grid.voxel(p))] = 0;
+  }
+  cell.field.rebuild(cell.free);
+  left.field.rebuild(left.free);
+  return left;
+}
+
 inline JointVector random_joints(Random& random, double range_rad) {
   JointVector q = JointVector::zero(6);
   for (int j = 0; j < 6; ++j) q[j] = random.uniform(-range_rad, range_rad);
@@ -70,9 +85,11 @@ inline JointVector random_joints(Random& random, double range_rad) {
 inline constexpr double kSampledMax_m = 0.06;
 
 /// Margin of a configuration from first principles: points along each capsule's axis, exact distances to voxels, zone
-/// and keep-outs; pairs of capsules by points too. An upper bound of the true margin, because it samples.
+/// and keep-outs; pairs of capsules by points too. `zone_left`, when given, is what hits left of the zone. An upper
+/// bound of the true margin, because it samples.
 inline double sampled_margin_m(const ArmModel& arm, const Body& body, const RandomCell& cell, const FreeSpace& space,
-                               const Clearance& need, const JointVector& q, double spacing_m) {
+                               const Clearance& need, const JointVector& q, double spacing_m,
+                               const RandomCell* zone_left = nullptr) {
   const LinkFrames frames = forward(arm, q);
   double margin = kSampledMax_m;
   std::vector<std::vector<Eigen::Vector3d>> points;
@@ -90,6 +107,10 @@ inline double sampled_margin_m(const ArmModel& arm, const Body& body, const Rand
         here = std::min({space.zone.radius_m - std::hypot(p.x(), p.y()), p.z() - space.zone.floor_m,
                          space.zone.floor_m + space.zone.height_m - p.z()}) -
                need.surface_m;
+      }
+      if (zone_left != nullptr) {
+        here =
+            std::min(here, zone_left->exact_distance_m(p, c.radius_m + need.voxels_m + kSampledMax_m) - need.voxels_m);
       }
       if (here < c.radius_m + kSampledMax_m && space.field != nullptr) {
         here = std::max(here, cell.exact_distance_m(p, c.radius_m + need.voxels_m + kSampledMax_m) - need.voxels_m);
