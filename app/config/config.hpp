@@ -73,9 +73,9 @@ struct Config {
     int views_min = 8;
     int views_max = 30;
     int holdout_views = 4;
-    double target_sigma_mm = 0.25;  ///< predicted, norm over the axes: enough views
-    double target_sigma_mrad = 0.50;
-    double settle_time_s = 0.4;  ///< flange ring-down below 0.1 mm
+    double target_sigma_mm = 0.14;  ///< predicted, norm over the axes: enough views
+    double target_sigma_mrad = 0.30;
+    double settle_time_s = 0.2;  ///< before the first look; then until the picture stands still
     int frames_per_view = 3;
     double corner_sigma_px = 0.10;  ///< used to predict, and as what is expected of it; the solve estimates its own
     double robot_sigma_mm =

@@ -129,7 +129,12 @@ void add_calibration_keys(Keys& keys, Config& c) {
                   {},
                   "predicted standard deviation at which views suffice"});
   keys.push_back({"calibration.target_sigma_mrad", &k.target_sigma_mrad, 0.01, 20, {}, "the same of the rotation"});
-  keys.push_back({"calibration.settle_time_s", &k.settle_time_s, 0.0, 5.0, {}, "wait after a motion before looking"});
+  keys.push_back({"calibration.settle_time_s",
+                  &k.settle_time_s,
+                  0.0,
+                  5.0,
+                  {},
+                  "wait after a motion before looking; a board's picture that still moves is waited for"});
   keys.push_back({"calibration.frames_per_view", &k.frames_per_view, 1, 8, {}, "frames averaged for one view"});
   keys.push_back({"calibration.corner_sigma_px",
                   &k.corner_sigma_px,

@@ -53,7 +53,7 @@ Result<CornerSet> Workbench::corners_of(const hal::Frame& frame) {
   return detect_target(GrayImage{image.data, image.width, image.height}, board_, preset.detection);
 }
 
-Result<CornerSet> Workbench::averaged_corners(const DetectArguments& arguments) {
+BoardSight Workbench::sight_of(const DetectArguments& arguments) {
   std::vector<CornerSet> found;
   for (const PosedFrame& posed : arguments.frames) {
     auto corners = corners_of(posed.frame);
@@ -61,7 +61,17 @@ Result<CornerSet> Workbench::averaged_corners(const DetectArguments& arguments) 
     // A board that is not in the first frame of a standing arm is not in the others.
     if (found.empty()) break;
   }
-  return average_corners(found);
+  BoardSight sight;
+  if (found.empty()) return sight;
+  if (auto picture = judge_standing(found)) {
+    sight.still = picture->still;
+    sight.moved_px = picture->moved_px;
+    if (sight.still || arguments.looks >= kLooksMax) sight.picture = std::move(*picture);
+  } else {
+    sight.still = false;
+    sight.moved_px = kFramesAgree_px;  // at least: average_corners found no two alike
+  }
+  return sight;
 }
 
 /// The frame that was read last is the picture of this observation.
@@ -88,10 +98,13 @@ void Workbench::settle_observations(BoardLook purpose) {
 
 DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   DetectResult result;
-  if (arguments.purpose == BoardLook::kVerify) ++verification_looks_;
-  const auto corners = averaged_corners(arguments);
-  if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
+  if (arguments.purpose == BoardLook::kVerify && arguments.looks == 1) ++verification_looks_;
+  const BoardSight sight = sight_of(arguments);
+  result.still = sight.still;
+  result.moved_px = sight.moved_px;
+  if (!sight.picture) return result;
+  const CornerSet& corners = sight.picture->mean;
+  const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners);
   if (!pose) return result;
   result.found = true;
   result.rms_px = pose->residual_rms_px;
@@ -111,9 +124,10 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     Observation o;
     o.joints_rad = last.at_rad;
     o.time_s = last.frame.stamp.seconds();
-    o.view = {forward(arm_, last.at_rad).flange(), corners->corners_px, corners->ids};
+    o.view = {forward(arm_, last.at_rad).flange(), corners.corners_px, corners.ids};
     o.pose = *pose;
     o.residual_rms_px = pose->residual_rms_px;
+    o.settling = {static_cast<int>(arguments.looks), sight.moved_px, sight.picture->scatter_px, sight.still};
     keep_picture(observations_.size());
     observations_.push_back(std::move(o));
     settle_observations(arguments.purpose);
@@ -124,9 +138,11 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
 CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   CheckBoardResult result;
   if (!hand_eye_) return result;
-  const auto corners = averaged_corners(arguments);
-  if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
+  const BoardSight sight = sight_of(arguments);
+  result.still = sight.still;
+  result.moved_px = sight.moved_px;
+  if (!sight.picture) return result;
+  const auto pose = estimate_board_pose(color_.intrinsics(), board_, sight.picture->mean);
   if (!pose) return result;
   result.seen = true;
   const auto base_T_flange = forward(arm_, arguments.frames.back().at_rad).flange();

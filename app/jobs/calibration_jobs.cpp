@@ -63,14 +63,16 @@ std::optional<ViewDesignModel> Workbench::rough_model() const {
   model.corner_sigma_px = config_.calibration.corner_sigma_px;
   model.arm_sigma = arm_sigma_expected();
   RefinementOptions options;
-  options.corner_sigma_px = model.corner_sigma_px;
+  const bool measured = observations_.size() >= kIndependentMin;
+  options.corner_sigma_px = measured ? 0 : model.corner_sigma_px;
   options.arm_sigma = model.arm_sigma;
-  options.rounds_max = 1;
+  options.rounds_max = measured ? 3 : 1;
   std::vector<CalibrationView> taken;
   for (const Observation& o : observations_) taken.push_back(o.view);
   if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) {
     model.flange_T_camera = refined->flange_T_camera;
     model.base_T_board = refined->base_T_board;
+    model.corner_sigma_px = refined->corner_sigma_px;
   }
   return model;
 }
@@ -189,6 +191,7 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
     r.detected_px = o.view.corners_px;
     r.detected_ids = o.view.ids;
     r.rms_px = o.residual_rms_px;
+    r.settling = o.settling;
     if (hand_eye_) {
       r.counted = place != counted.end();
       if (k < hand_eye_->fits.size()) r.used = hand_eye_->fits[k].used;

@@ -21,6 +21,7 @@
 #include "algorithms/view_planning/remaining_reason.hpp"
 #include "algorithms/view_planning/sweep.hpp"
 #include "algorithms/vision/board_pose.hpp"
+#include "algorithms/vision/standing_picture.hpp"
 #include "app/config/config.hpp"
 #include "app/dataset/hand_eye_file.hpp"
 #include "app/jobs/published_space.hpp"
@@ -47,6 +48,14 @@ struct Observation {
   CalibrationView view;
   BoardPose pose;
   double residual_rms_px = 0;
+  SettlingRecord settling;
+};
+
+/// What the frames of one look show.
+struct BoardSight {
+  std::optional<StandingPicture> picture;  ///< empty: no board to be used
+  bool still = true;
+  double moved_px = 0;
 };
 
 /// Around the arm in depth images: the thesis's self filter.
@@ -129,7 +138,7 @@ class Workbench {
   [[nodiscard]] NextViewResult explore_at(const Pace& pace, const FromHere& here);
 
   [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
-  [[nodiscard]] Result<CornerSet> averaged_corners(const DetectArguments& arguments);
+  [[nodiscard]] BoardSight sight_of(const DetectArguments& arguments);
   void keep_picture(std::size_t observation);
   void settle_observations(BoardLook purpose);
   [[nodiscard]] std::optional<ViewDesignModel> rough_model() const;

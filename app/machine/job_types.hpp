@@ -140,13 +140,19 @@ struct PosedFrame {
 
 enum class BoardLook : std::uint8_t { kLocate, kIdentify, kCollect, kConclude, kVerify };
 
-struct DetectArguments {  ///< kDetectBoard: detect in each frame, average, remember as view number `view` when found
+/// Looks from one stop whose picture moved are taken again, up to so many: 2 s with three frames of 30 Hz.
+inline constexpr std::uint32_t kLooksMax = 16;
+
+/// kDetectBoard, kCheckBoard: detect in each frame, average; kDetectBoard remembers it as view number `view` when
+/// found. A picture that moves is not used before the last look.
+struct DetectArguments {
   BoardLook purpose = BoardLook::kLocate;
   std::uint32_t view = 0;
   FixedVector<PosedFrame, 8> frames;
+  std::uint32_t looks = 1;  ///< from this stop, this one included
   template <typename Archive>
   void fields(Archive& a) {
-    a(purpose, view, frames);
+    a(purpose, view, frames, looks);
   }
 };
 
@@ -156,9 +162,11 @@ struct DetectResult {
   std::array<double, 3> camera_p_board_m{};     ///< origin of the board in the camera
   std::array<double, 4> camera_q_board_xyzw{};  ///< rotation of the board in the camera
   bool changed = false;                         ///< against the first view of kIdentify: the image moved with the joint
+  bool still = true;                            ///< false: the picture moved between the frames
+  double moved_px = 0;                          ///< from frame to frame, see standing_picture.hpp
   template <typename Archive>
   void fields(Archive& a) {
-    a(found, rms_px, camera_p_board_m, camera_q_board_xyzw, changed);
+    a(found, rms_px, camera_p_board_m, camera_q_board_xyzw, changed, still, moved_px);
   }
 };
 
@@ -266,9 +274,11 @@ struct CheckBoardResult {
   bool moved = false;
   double shift_mm = 0;
   double limit_mm = 0;
+  bool still = true;  ///< false: the picture moved between the frames
+  double moved_px = 0;
   template <typename Archive>
   void fields(Archive& a) {
-    a(seen, moved, shift_mm, limit_mm);
+    a(seen, moved, shift_mm, limit_mm, still, moved_px);
   }
 };
 

@@ -285,13 +285,28 @@ Machine::Trip Machine::advance_trip(const MachineEvent& event) {
 // ---- looks
 
 void Machine::start_look(bool depth, int count) {
+  look_depth_ = depth;
+  look_count_ = static_cast<std::size_t>(count);
+  looks_ = 1;
+  open_look(settings_.settle_time_s);
+}
+
+bool Machine::look_again(double moved_px) {
+  if (looks_ >= kLooksMax) {
+    show("the picture does not stand still: {:.2f} px from frame to frame", moved_px);
+    return false;
+  }
+  ++looks_;
+  open_look(0);
+  return true;
+}
+
+void Machine::open_look(double wait_s) {
   looking_ = true;
   look_open_ = false;
-  look_depth_ = depth;
   look_unposed_ = false;
-  look_count_ = static_cast<std::size_t>(count);
   look_.clear();
-  set_timer(MachineTimer::kSettle, settings_.settle_time_s);
+  set_timer(MachineTimer::kSettle, wait_s);
 }
 
 bool Machine::advance_look(const MachineEvent& event) {

@@ -20,7 +20,7 @@ enum class StartSource : std::uint8_t { kPendant, kPanel };
 struct MachineSettings {
   RunScope scope = RunScope::kEverything;
   StartSource start_source = StartSource::kPendant;
-  double settle_time_s = 0.4;
+  double settle_time_s = 0.2;
   int frames_per_view = 3;
   int calibration_views_min = 8;
   int calibration_views_max = 30;
@@ -123,6 +123,11 @@ class Machine {
 
   /// Waits until the arm has settled, then collects `count` frames with their poses.
   void start_look(bool depth, int count);
+  /// Looks at the board once more from the same stop, at once, because the picture moved. False: not again, that was
+  /// the last look.
+  [[nodiscard]] bool look_again(double moved_px);
+  /// How often it was looked from this stop.
+  [[nodiscard]] std::uint32_t looks() const { return looks_; }
   [[nodiscard]] bool advance_look(const MachineEvent& event);  ///< true once, when the frames are there
   [[nodiscard]] const FixedVector<PosedFrame, 8>& look() const { return look_; }
 
@@ -132,6 +137,7 @@ class Machine {
   [[nodiscard]] std::optional<IntegrateResult> integrate_result(const MachineEvent& event);
 
  private:
+  void open_look(double wait_s);
   /// What holds in every state: a silent arm, a job that failed. True when it ended the job.
   [[nodiscard]] bool supervise(const MachineEvent& event);
   void dispatch(const MachineEvent& event);
@@ -180,6 +186,7 @@ class Machine {
   bool looking_ = false, look_open_ = false, look_depth_ = false;
   bool look_unposed_ = false;  ///< frames came, but none whose pose is known
   std::size_t look_count_ = 0;
+  std::uint32_t looks_ = 0;
   Instant look_from_{};
   FixedVector<PosedFrame, 8> look_;
 };

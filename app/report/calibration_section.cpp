@@ -9,6 +9,7 @@
 #include "app/report/picture_bytes.hpp"
 #include "app/report/ros_files.hpp"
 #include "app/report/sections.hpp"
+#include "app/report/settling.hpp"
 
 namespace firstlook {
 namespace {
@@ -35,6 +36,20 @@ std::string validated(const HandEyeResult& h, std::string text) {
   return h.holdout_rms_m > 0 ? std::move(text) : std::string("not determined");
 }
 
+std::string how_it_settled(const SettlingSummary& s) {
+  std::string text = "from frame to frame of a stop, one frame; ";
+  text += s.looked_again == 0
+              ? "at every stop the first look was at rest"
+              : fmt::format("at {} stops the picture still moved at first, and was looked at up to {} times",
+                            s.looked_again, s.looks_max);
+  if (s.restless > 0) {
+    text +=
+        fmt::format("; at {} it never stood still ({:.2f} px): is the cart, the board or the camera's bracket shaking?",
+                    s.restless, s.moved_max_px);
+  }
+  return text;
+}
+
 std::string quality_table(const RunRecord& record) {
   const HandEyeResult& h = *record.hand_eye;
   HtmlTable table({"figure", "value", "what it says"}, 3);
@@ -56,6 +71,10 @@ std::string quality_table(const RunRecord& record) {
              "for each axis, estimated from the views"});
   if (!h.from_pairs)
     table.row({"corner noise", fmt::format("{:.3f} px", h.corner_sigma_px), "estimated from the views"});
+  if (const auto settling = settling_of(record.calibration_views)) {
+    table.row(
+        {"picture at rest", fmt::format("corners scatter {:.3f} px", settling->scatter_px), how_it_settled(*settling)});
+  }
   table.row({"usable distance", fmt::format("{:.2f} m", h.usable_distance_m),
              "farthest object at which a 3σ error stays within the gripper's tolerance"});
   const auto gated = std::count_if(h.fits.begin(), h.fits.end(), [](const ViewFit& fit) { return !fit.used; });

@@ -4,6 +4,7 @@
 
 #include "app/report/hand_eye_json.hpp"
 #include "app/report/ros_files.hpp"
+#include "app/report/settling.hpp"
 
 namespace firstlook {
 namespace {
@@ -108,6 +109,13 @@ std::string result_json(const RunRecord& record) {
     nlohmann::json hand_eye = json["hand_eye"];
     describe_stored(*record.verified, hand_eye);
     json["hand_eye"] = hand_eye;
+  }
+  if (const auto settling = settling_of(record.calibration_views); settling && record.hand_eye) {
+    json["hand_eye"]["settling"] = {{"corner_scatter_px", settling->scatter_px},
+                                    {"moved_max_px", settling->moved_max_px},
+                                    {"stops_looked_at_again", settling->looked_again},
+                                    {"looks_max", settling->looks_max},
+                                    {"stops_never_still", settling->restless}};
   }
   if (record.hand_eye && record.comparison) {
     json["hand_eye"]["solver_comparison"] = solver_comparison_json(*record.comparison);

@@ -74,6 +74,14 @@ struct PhaseRecord {
 };
 
 /// One view of the board that took part in the calibration, in the order taken.
+/// How the picture stood while a view was taken (standing_picture.hpp).
+struct SettlingRecord {
+  int looks = 1;          ///< until it stood still, or until there was no more waiting
+  double moved_px = 0;    ///< in the look that was used
+  double scatter_px = 0;  ///< of a corner in one of its frames
+  bool still = true;
+};
+
 struct CalibrationViewRecord {
   std::string name;  ///< of recorded data: its image; empty in a run
   double time_s = 0;
@@ -86,7 +94,8 @@ struct CalibrationViewRecord {
   std::optional<double> holdout_px;  ///< the same under a solve that left this view out; empty: not validated
   bool counted = true;               ///< false: too near a later view to tell anything of its own; not in the solve
   bool used = true;                  ///< false: the solve left it out as wrong
-  GrayPicture picture;               ///< whole frame of the camera; empty without one (e.g. --sensor fast)
+  std::optional<SettlingRecord> settling;  ///< empty: recorded data
+  GrayPicture picture;                     ///< whole frame of the camera; empty without one (e.g. --sensor fast)
 };
 
 /// One look of sweep or exploration, in the order taken; counts are voxels of the reach zone after it. When frames went

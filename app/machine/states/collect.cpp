@@ -43,8 +43,9 @@ Handled on_collect(Machine& m, const MachineEvent& event) {
   if (const auto choice = m.result_of<CalibrationViewResult>(JobKind::kNextCalibrationView, event)) {
     take(m, *choice);
   } else if (m.advance_look(event)) {
-    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kCollect, p.observations, m.look()});
+    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kCollect, p.observations, m.look(), m.looks()});
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
+    if (!seen->still && m.look_again(seen->moved_px)) return Handled::kNo;
     if (seen->found) {
       ++p.observations;
       p.failed_looks = 0;

@@ -16,8 +16,9 @@ Handled on_verify_board(Machine& m, const MachineEvent& event) {
       m.conclude(Outcome::kSafelyStopped, plan->fault);
     }
   } else if (m.advance_look(event)) {
-    m.start_job(JobKind::kCheckBoard, DetectArguments{BoardLook::kConclude, 0, m.look()});
+    m.start_job(JobKind::kCheckBoard, DetectArguments{BoardLook::kConclude, 0, m.look(), m.looks()});
   } else if (const auto check = m.result_of<CheckBoardResult>(JobKind::kCheckBoard, event)) {
+    if (!check->still && m.look_again(check->moved_px)) return Handled::kNo;
     if (check->seen && !check->moved) {
       m.conclude(Outcome::kDone, std::nullopt);
     } else {

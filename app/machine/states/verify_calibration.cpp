@@ -68,8 +68,9 @@ Handled on_verify_calibration(Machine& m, const MachineEvent& event) {
   } else if (const auto choice = m.result_of<VerificationViewResult>(JobKind::kNextVerificationView, event)) {
     take(m, *choice);
   } else if (m.advance_look(event)) {
-    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kVerify, p.observations, m.look()});
+    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kVerify, p.observations, m.look(), m.looks()});
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
+    if (!seen->still && m.look_again(seen->moved_px)) return Handled::kNo;
     ++(seen->found ? p.observations : p.failed_looks);
     next_view(m);
   } else if (const auto result = m.result_of<VerifyResult>(JobKind::kVerifyCalibration, event)) {

@@ -21,7 +21,11 @@ const JointVector kStart{0, -1.57, 1.57, -1.57, -1.57, 0};  // the simulated cel
 class Bench {
  public:
   explicit Bench(std::optional<StoredCalibration> stored = std::nullopt) : color_(kColor), workers_(2) {
-    color_.corners = [this](const hal::Frame&) { return seen_from(at_rad_); };
+    color_.corners = [this](const hal::Frame& frame) {
+      JointVector q = at_rad_;
+      q[0] += swing_rad * static_cast<double>(frame.sequence % 3);
+      return seen_from(q);
+    };
     const Pose base_T_camera = forward(arm_, kStart).flange().pose() * flange_T_camera_;
     Pose camera_T_board = Pose::Identity();
     camera_T_board.translation() = Eigen::Vector3d(0, 0, 0.7) - board_.center();
@@ -120,6 +124,13 @@ class Bench {
       if (result_of<DetectResult>(JobKind::kDetectBoard, look(BoardLook::kVerify, at)).found) ++views;
     }
     return views;
+  }
+  double swing_rad = 0;  ///< of the base joint, from frame to frame
+  DetectArguments look_at_three(BoardLook purpose, std::uint32_t looks) {
+    DetectArguments arguments = look(purpose, kStart);
+    for (int i = 0; i < 2; ++i) arguments.frames.push_back(frame(color_, kStart));
+    arguments.looks = looks;
+    return arguments;
   }
   [[nodiscard]] const Workbench& bench() const { return *bench_; }
   mock::MockDepthCamera& depth() { return depth_; }
@@ -249,6 +260,34 @@ TEST_CASE("the right stored calibration is verified on a few views and gives the
   const auto check = bench.result_of<CheckBoardResult>(JobKind::kCheckBoard, bench.look(BoardLook::kConclude, kStart));
   CHECK(check.seen);
   CHECK_FALSE(check.moved);
+}
+
+TEST_CASE("a picture that moves is no view, unless it never stands still", "[jobs]") {
+  Bench bench;
+  bench.swing_rad = 0.001;  // 0.5 px
+  auto seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, 1));
+  CHECK_FALSE(seen.still);
+  CHECK_FALSE(seen.found);
+  CHECK(seen.moved_px > 0.2);
+  CHECK(bench.bench().calibration_records().empty());
+  seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, kLooksMax));
+  CHECK_FALSE(seen.still);
+  CHECK(seen.found);
+  bench.swing_rad = 1e-5;  // the noise is another, the place the same
+  seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, 2));
+  CHECK(seen.still);
+  CHECK(seen.found);
+  bench.swing_rad = 0.1;  // the frames do not even agree
+  seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, kLooksMax));
+  CHECK_FALSE(seen.still);
+  CHECK_FALSE(seen.found);
+  const auto records = bench.bench().calibration_records();
+  REQUIRE(records.size() == 2);
+  CHECK_FALSE(records[0].settling->still);
+  CHECK(records[0].settling->looks == static_cast<int>(kLooksMax));
+  CHECK(records[1].settling->still);
+  CHECK(records[1].settling->looks == 2);
+  CHECK(records[1].settling->scatter_px == Approx(0.05).epsilon(0.2));
 }
 
 TEST_CASE("a stored calibration of another mount is rejected, with figure and limit", "[jobs]") {

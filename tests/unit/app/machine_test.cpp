@@ -249,6 +249,63 @@ TEST_CASE("frames whose time the arm does not know are not a camera that stopped
   CHECK(world.ending.fault == Fault::kClockWrong);
 }
 
+TEST_CASE("a picture that still moves is looked at again, at once, and is not a view", "[machine]") {
+  ScriptedWorld w;
+  std::vector<std::uint32_t> looks;
+  w.detect = [&](const DetectArguments& a) {
+    DetectResult r;
+    r.changed = a.purpose == BoardLook::kIdentify;
+    if (a.purpose == BoardLook::kCollect) {
+      looks.push_back(a.looks);
+      r.still = looks.size() % 3 == 0;
+      r.moved_px = r.still ? 0.01 : 0.3;
+    }
+    r.found = r.still;
+    return r;
+  };
+  REQUIRE(w.run_until(StateId::kReady));
+  w.press(hal::OperatorAction::kPlay);
+  REQUIRE(w.run_to_end());
+  CHECK(w.ending.outcome == Outcome::kDone);
+  CHECK(looks == std::vector<std::uint32_t>{1, 2, 3, 1, 2, 3, 1, 2, 3, 1, 2, 3});
+  CHECK(std::none_of(w.shown.begin(), w.shown.end(),
+                     [](const std::string& line) { return line.find("stand still") != std::string::npos; }));
+}
+
+TEST_CASE("a picture that never stands still is used in the end, and said", "[machine]") {
+  ScriptedWorld w;
+  std::uint32_t most = 0;
+  w.detect = [&](const DetectArguments& a) {
+    DetectResult r;
+    r.changed = a.purpose == BoardLook::kIdentify;
+    r.still = a.purpose != BoardLook::kCollect;
+    r.moved_px = 0.25;
+    r.found = r.still || a.looks == kLooksMax;
+    most = std::max(most, a.looks);
+    return r;
+  };
+  REQUIRE(w.run_until(StateId::kReady));
+  w.press(hal::OperatorAction::kPlay);
+  REQUIRE(w.run_to_end());
+  CHECK(w.ending.outcome == Outcome::kDone);
+  CHECK(most == kLooksMax);
+  CHECK(std::count(w.shown.begin(), w.shown.end(), "the picture does not stand still: 0.25 px from frame to frame") ==
+        ScriptedWorld::default_settings().calibration_views_max);
+}
+
+TEST_CASE("the board is not judged to have moved by a picture that moves", "[machine]") {
+  ScriptedWorld w;
+  w.check = {.seen = true, .moved = true, .still = false, .moved_px = 0.4};
+  REQUIRE(w.run_until(StateId::kReady));
+  w.press(hal::OperatorAction::kPlay);
+  REQUIRE(w.run_until(StateId::kVerifyBoard, 4000));
+  for (int i = 0; i < 250; ++i) w.tick();  // 2 s
+  REQUIRE(w.machine.state() == StateId::kVerifyBoard);
+  w.check = {.seen = true, .moved = false};
+  REQUIRE(w.run_to_end());
+  CHECK(w.ending.outcome == Outcome::kDone);
+}
+
 TEST_CASE("a frozen depth camera stops the job", "[machine]") {
   ScriptedWorld world;
   world.integrated.frozen = true;
