@@ -4,6 +4,7 @@
 
 #include "algorithms/calibration/unobservable.hpp"
 #include "algorithms/calibration/verdict.hpp"
+#include "tests/support/sanitized_builds.hpp"
 #include "tests/unit/calibration/synthetic_views.hpp"
 
 using namespace firstlook;
@@ -69,7 +70,8 @@ std::vector<PosePair> pairs_of_arm(const std::vector<Joint>& arm, const Pose& fl
 
 TEST_CASE("an arm with two joints: 15 poses are solved", "[calibration][arms]") {
   const Pose truth = camera_in_flange({0.275, 0, 0.6});
-  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+  constexpr std::uint64_t kSeeds = test::trials(20);
+  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
     CAPTURE(seed);
     Random random(seed, 71);
     const auto exact = calibrate_hand_eye_from_pairs(pairs_of_arm(kTwoJoints, truth, 15, 0, random));
@@ -91,7 +93,8 @@ TEST_CASE("an arm with seven joints: 144 poses are solved and accepted", "[calib
   REQUIRE(exact);
   // Table 6-2 of the thesis: 0.017 mm by Tsai's method without noise.
   CHECK(pose_difference(truth, exact->flange_T_camera.pose()).norm() < 1e-8);
-  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+  constexpr std::uint64_t kSeeds = test::trials(5);
+  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
     Random noise(seed, 73);
     const auto noisy = calibrate_hand_eye_from_pairs(pairs_of_arm(kSevenJoints, truth, 144, 0.5, noise));
     REQUIRE(noisy);

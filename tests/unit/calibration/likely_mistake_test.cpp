@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "algorithms/calibration/verdict.hpp"
+#include "tests/support/sanitized_builds.hpp"
 #include "tests/unit/calibration/synthetic_views.hpp"
 
 using namespace firstlook;
@@ -15,7 +16,7 @@ using test::Setup;
 
 namespace {
 
-constexpr std::uint64_t kSeeds = 4;
+constexpr std::uint64_t kSeeds = test::trials(4);
 
 using Pairs = std::vector<PosePair>;
 using Views = std::vector<CalibrationView>;
@@ -107,7 +108,7 @@ void check_pairs(const std::function<void(Pairs&)>& spoil, Mistake mistake, cons
 /// Through the verdict: rejected, or not solved at all; with the sentence as a reason.
 void check_views(const std::function<void(Views&, Setup&)>& spoil, Mistake mistake, const std::string& words,
                  int count = 15) {
-  for (std::uint64_t seed = 0; seed < kSeeds / 2; ++seed) {
+  for (std::uint64_t seed = 0; seed < (kSeeds + 1) / 2; ++seed) {
     CAPTURE(seed);
     Setup setup;
     Random random(seed, 92);
@@ -321,8 +322,9 @@ TEST_CASE("likely mistake: single views that were left out are explained", "[cal
 }
 
 TEST_CASE("likely mistake: good data is never accused, however noisy or few", "[calibration][mistake]") {
-  int searched = 0;
-  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+  constexpr std::uint64_t kDraws = test::trials(30);
+  std::uint64_t searched = 0;
+  for (std::uint64_t seed = 0; seed < kDraws; ++seed) {
     CAPTURE(seed);
     Setup setup;
     Random random(seed, 95);
@@ -341,5 +343,5 @@ TEST_CASE("likely mistake: good data is never accused, however noisy or few", "[
     CHECK_FALSE(from_views.found);
     searched += from_pairs.tried > 0 ? 1 : 0;
   }
-  CHECK(searched > 10);
+  CHECK(searched > kDraws / 3);
 }
