@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <deque>
 #include <new>
 
 namespace firstlook {
@@ -101,17 +102,22 @@ Status run_ceres(const Shared& shared, std::span<const BundleView> views, int it
   std::vector<Parameters> poses(1 + shared.boards.size()), arm(shared.reference.deviations.size());
   Parameters& hand_eye = poses.front();
   const std::span<Parameters> boards = std::span(poses).subspan(1);
-  ceres::Problem problem;
+  // Ours, and not the problem's: it would lose the cost that it is given when there is no memory to take it in.
+  std::deque<ReprojectionCost> reprojection;
+  ArmPrior arm_prior(shared.noise.arm_sigma);
+  ceres::Problem::Options problem_options;
+  problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(problem_options);
   auto options = solver_options(iterations_max);
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (std::size_t i = 0; i < views.size(); ++i) {
     double* const deviation = arm[views[i].station].data();
     const bool first = !problem.HasParameterBlock(deviation);
     if (first) Eigen::Map<Vector6d>{deviation} = shared.reference.deviations[views[i].station];
-    problem.AddResidualBlock(new ReprojectionCost(shared, views[i]), nullptr, hand_eye.data(),
+    problem.AddResidualBlock(&reprojection.emplace_back(shared, views[i]), nullptr, hand_eye.data(),
                              boards[views[i].board].data(), deviation);
     if (!first) continue;
-    problem.AddResidualBlock(new ArmPrior(shared.noise.arm_sigma), nullptr, deviation);
+    problem.AddResidualBlock(&arm_prior, nullptr, deviation);
     options.linear_solver_ordering->AddElementToGroup(deviation, 0);
   }
   for (Parameters& pose : poses) options.linear_solver_ordering->AddElementToGroup(pose.data(), 1);

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/sanitized_builds.hpp"
+
 namespace firstlook::test {
 
 struct ProgramOptions {
@@ -15,7 +17,7 @@ struct ProgramOptions {
   std::string stdout_to;                        ///< a path; empty: captured
   std::string signal_at;                        ///< when this stands on stderr, `signal` is sent, once
   int signal = 0;
-  double limit_s = 300;  ///< then the program is killed
+  double limit_s = 300 * kSlowdown;  ///< then the program is killed
 };
 
 struct ProgramResult {

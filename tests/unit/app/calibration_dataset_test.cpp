@@ -16,6 +16,7 @@
 #include "app/cli/calibrate_command.hpp"
 #include "app/dataset/gray_image_file.hpp"
 #include "app/dataset/hand_eye_file.hpp"
+#include "tests/support/sanitized_builds.hpp"
 #include "tests/unit/calibration/synthetic_views.hpp"
 #include "tests/unit/vision/draw_board.hpp"
 
@@ -145,9 +146,10 @@ TEST_CASE("a data set of corners is read and solved", "[app][calibration]") {
   CHECK((data->views[3].corners_px[7] - views[3].corners_px[7]).norm() < 1e-6);
   CHECK(pose_difference(data->views[3].base_T_flange.pose(), views[3].base_T_flange.pose()).norm() < 1e-10);
   CHECK(data->names[3] == "3.png");
-  for (const std::string_view solver : solver_names()) {
-    CAPTURE(solver);
-    CHECK(run_calibrate_command({folder.path.string(), std::string(solver), true, true}) == 0);
+  const auto solvers = solver_names();
+  for (std::size_t i = 0; i < solvers.size(); i += test::kTrialDivisor) {
+    CAPTURE(solvers[i]);
+    CHECK(run_calibrate_command({folder.path.string(), std::string(solvers[i]), true, true}) == 0);
   }
 }
 

@@ -10,6 +10,7 @@
 #include "platform/memory/allocation_guard.hpp"
 #include "tests/support/mock_color_camera.hpp"
 #include "tests/support/mock_depth_camera.hpp"
+#include "tests/support/sanitized_builds.hpp"
 
 namespace firstlook {
 namespace {
@@ -188,7 +189,7 @@ StoredCalibration stored_calibration() {
 template <typename MakeArguments>
 void fail_every_allocation(Bench& bench, JobKind kind, MakeArguments arguments) {
   int failures = 0;
-  for (std::uint64_t nth = 1;; nth += 1 + nth / 8) {
+  for (std::uint64_t nth = 1;; nth += 1 + nth * test::kTrialDivisor / 8) {
     const auto asked = arguments();
     memory::fail_job_allocation(nth);
     const Bench::Outcome outcome = bench.execute(kind, asked);
