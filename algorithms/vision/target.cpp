@@ -234,7 +234,7 @@ Result<CornerSet> average_corners(std::span<const CornerSet> frames, double agre
     mean.residual_rms_px += frame.residual_rms_px;
     ++frames_agreeing;
   }
-  if (frames_agreeing * 2 < frames.size() || frames_agreeing == 0) {
+  if (frames_agreeing * 2 <= frames.size()) {
     return failure(Fault::kBoardNotFound, "only {} of {} frames agree: the arm or the board moves", frames_agreeing,
                    frames.size());
   }

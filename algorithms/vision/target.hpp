@@ -136,7 +136,7 @@ inline constexpr double kFramesAgree_px = 1.0;
 /// Mean of the same points in several frames of a standing camera. A frame whose points lie farther than
 /// `agreement_max_px` (RMS) from the median of all frames is left out, and so is a point that less than half of the
 /// frames show.
-/// @return kBoardNotFound for no frame, frames of different targets, or when less than half of the frames agree
+/// @return kBoardNotFound for no frame, frames of different targets, or when not more than half of the frames agree
 [[nodiscard]] Result<CornerSet> average_corners(std::span<const CornerSet> frames,
                                                 double agreement_max_px = kFramesAgree_px);
 

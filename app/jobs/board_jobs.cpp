@@ -62,7 +62,7 @@ BoardSight Workbench::sight_of(const DetectArguments& arguments) {
     if (found.empty()) break;
   }
   BoardSight sight;
-  if (found.empty()) return sight;
+  if (found.empty() || found.size() * 2 < arguments.frames.size()) return sight;  // not even half of the frames show it
   if (auto picture = judge_standing(found)) {
     sight.still = picture->still;
     sight.moved_px = picture->moved_px;

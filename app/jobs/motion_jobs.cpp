@@ -49,6 +49,7 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
   };
   if (!mapping) {
     const Clearance blind = blind_terms_.clearance();
+    publish_blind(arguments.now_s);
     plan_at(space_of(MotionPhase::kBeforeCalibration), {blind, blind, limits_});
     return result;
   }

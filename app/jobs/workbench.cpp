@@ -90,9 +90,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
   for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});
   mapping_views_.reserve(kViewRecordsMax);
   observations_.reserve(static_cast<std::size_t>(config.calibration.views_max) + 1);
-  map_.free_mask(0, config.map.free_max_age_s, free_mask_);
-  published_.publish(space_of(MotionPhase::kBeforeCalibration), envelope_body_,
-                     guardian_clearance(blind_terms_.clearance(), blind_terms_.stopping_m), free_mask_);
+  publish_blind(0);
   published_.take();
 }
 
@@ -215,6 +213,14 @@ void Workbench::rebuild_free_space(double now_s) {
   }
   published_.publish(mapping_space_, camera_body_,
                      guardian_clearance(mapping_terms_->clearance(), mapping_terms_->stopping_m), free_mask_);
+}
+
+/// The guardian holds motions to what they are planned with: here the envelope in the safe zone. It contains the
+/// camera, but not all of the capsules that stand for the camera once its place is known.
+void Workbench::publish_blind(double now_s) {
+  map_.free_mask(now_s, config_.map.free_max_age_s, free_mask_);
+  published_.publish(space_of(MotionPhase::kBeforeCalibration), envelope_body_,
+                     guardian_clearance(blind_terms_.clearance(), blind_terms_.stopping_m), free_mask_);
 }
 
 void Workbench::forget_known_free() {

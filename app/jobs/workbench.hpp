@@ -154,6 +154,7 @@ class Workbench {
   [[nodiscard]] bool is_frozen(const hal::Frame& frame, IntegrateResult& result);
   void begin_mapping();
   void rebuild_free_space(double now_s);
+  void publish_blind(double now_s);
   void note_frame(const IntegrateArguments& arguments, const VoxelCounts& counts);
   void take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace);
 

@@ -24,7 +24,7 @@ class Bench {
   explicit Bench(std::optional<StoredCalibration> stored = std::nullopt) : color_(kColor), workers_(2) {
     color_.corners = [this](const hal::Frame& frame) {
       JointVector q = at_rad_;
-      q[0] += swing_rad * static_cast<double>(frame.sequence % 3);
+      q[0] += swing_rad * static_cast<double>(frame.sequence % 7);
       return seen_from(q);
     };
     const Pose base_T_camera = forward(arm_, kStart).flange().pose() * flange_T_camera_;
@@ -265,7 +265,7 @@ TEST_CASE("the right stored calibration is verified on a few views and gives the
 
 TEST_CASE("a picture that moves is no view, unless it never stands still", "[jobs]") {
   Bench bench;
-  bench.swing_rad = 0.001;  // 0.5 px
+  bench.swing_rad = 0.0005;  // 0.3 px or more
   auto seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, 1));
   CHECK_FALSE(seen.still);
   CHECK_FALSE(seen.found);
@@ -278,7 +278,7 @@ TEST_CASE("a picture that moves is no view, unless it never stands still", "[job
   seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, 2));
   CHECK(seen.still);
   CHECK(seen.found);
-  bench.swing_rad = 0.1;  // the frames do not even agree
+  bench.swing_rad = 0.01;  // the frames do not even agree
   seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, bench.look_at_three(BoardLook::kCollect, kLooksMax));
   CHECK_FALSE(seen.still);
   CHECK_FALSE(seen.found);
