@@ -14,10 +14,10 @@ namespace {
 using Parameters = std::array<double, 6>;
 
 struct Shared {
-  const CameraIntrinsics& camera;
   std::span<const BoardSpec> boards;
   const BundleState& reference;
   const BundleNoise& noise;
+  const IntrinsicsBelief& intrinsics;
 };
 
 Vector6d as_vector(const double* p) { return Eigen::Map<const Vector6d>(p); }
@@ -29,12 +29,21 @@ Matrix6d parameter_jacobian(const Vector6d& parameters) {
   return j;
 }
 
-/// Whitened reprojection errors of one view over differences of hand-eye, board (both from the reference) and arm.
+/// The reference's camera with differences of the numbers that are solved for.
+CameraIntrinsics moved_camera(const Shared& shared, const double* difference) {
+  IntrinsicsVector numbers = intrinsics_vector(shared.reference.camera);
+  numbers.head(shared.intrinsics.count) += Eigen::Map<const Eigen::VectorXd>(difference, shared.intrinsics.count);
+  return with_intrinsics(shared.reference.camera, numbers);
+}
+
+/// Whitened reprojection errors of one view over differences of hand-eye, board (both from the reference), arm, and the
+/// intrinsics that are solved for (from the reference).
 class ReprojectionCost final : public ceres::CostFunction {
  public:
   ReprojectionCost(const Shared& shared, const BundleView& view) : shared_(shared), view_(view) {
     set_num_residuals(2 * static_cast<int>(view.points.size()));
     *mutable_parameter_block_sizes() = {6, 6, 6};
+    if (with_intrinsics()) mutable_parameter_block_sizes()->push_back(shared.intrinsics.count);
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
@@ -44,9 +53,11 @@ class ReprojectionCost final : public ceres::CostFunction {
                                 perturb(view_.base_T_flange_said, at[2])};
     const std::array<Matrix6d, 3> inner = {parameter_jacobian(at[0]), parameter_jacobian(at[1]),
                                            parameter_jacobian(at[2])};
+    const CameraIntrinsics camera =
+        with_intrinsics() ? moved_camera(shared_, parameters[kIntrinsicsBlock]) : shared_.reference.camera;
     const BoardSpec& board = shared_.boards[view_.board];
     for (std::size_t i = 0; i < view_.points.size(); ++i) {
-      const auto term = corner_term(shared_.camera, geometry, board.corner(view_.points.point(i)));
+      const auto term = corner_term(camera, geometry, board.corner(view_.points.point(i)));
       if (!term) return false;
       const double scale = std::sqrt(view_.weights[i]) / shared_.noise.corner_sigma_px;
       Eigen::Map<Eigen::Vector2d>(residuals + 2 * i) = scale * (term->pixel - view_.points.corners_px[i]);
@@ -57,13 +68,43 @@ class ReprojectionCost final : public ceres::CostFunction {
         Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>>(jacobians[block] + 12 * i) =
             scale * *outer[block] * inner[block];
       }
+      if (!with_intrinsics() || jacobians[kIntrinsicsBlock] == nullptr) continue;
+      const Eigen::Index count = shared_.intrinsics.count;
+      Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>(
+          jacobians[kIntrinsicsBlock] + 2 * count * static_cast<Eigen::Index>(i), 2, count) =
+          scale * intrinsics_jacobian(camera, term->normalized).leftCols(count);
+    }
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kIntrinsicsBlock = 3;
+  [[nodiscard]] bool with_intrinsics() const { return shared_.intrinsics.count > 0; }
+
+  const Shared& shared_;
+  const BundleView& view_;
+};
+
+/// The whitened difference of the intrinsics from what is believed of them; 0 where nothing is.
+class BeliefCost final : public ceres::CostFunction {
+ public:
+  explicit BeliefCost(const Shared& shared) : shared_(shared) {
+    set_num_residuals(shared.intrinsics.count);
+    *mutable_parameter_block_sizes() = {shared.intrinsics.count};
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Index count = shared_.intrinsics.count;
+    const IntrinsicsVector scale = shared_.intrinsics.weight.cwiseSqrt();
+    const IntrinsicsVector off = intrinsics_vector(moved_camera(shared_, parameters[0])) - shared_.intrinsics.mean;
+    Eigen::Map<Eigen::VectorXd>(residuals, count) = scale.cwiseProduct(off).head(count);
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      Eigen::Map<Eigen::MatrixXd>(jacobians[0], count, count) = scale.head(count).asDiagonal();
     }
     return true;
   }
 
  private:
   const Shared& shared_;
-  const BundleView& view_;
 };
 
 /// The whitened arm deviation itself.
@@ -98,9 +139,11 @@ ceres::Solver::Options solver_options(int iterations_max) {
 
 Status run_ceres(const Shared& shared, std::span<const BundleView> views, int iterations_max, BundleState& result) {
   // Ceres goes through the blocks of a group by their addresses: one array gives them an order of ours.
-  std::vector<Parameters> poses(1 + shared.boards.size()), arm(shared.reference.deviations.size());
-  Parameters& hand_eye = poses.front();
-  const std::span<Parameters> boards = std::span(poses).subspan(1);
+  const std::size_t poses = 1 + shared.boards.size();
+  std::vector<double> global(6 * poses + IntrinsicsVector::SizeAtCompileTime);
+  std::vector<Parameters> arm(shared.reference.deviations.size());
+  const auto pose = [&](std::size_t number) { return global.data() + 6 * number; };  // 0: hand-eye, then the boards
+  double* const camera = pose(poses);
   ceres::Problem problem;
   auto options = solver_options(iterations_max);
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -108,19 +151,25 @@ Status run_ceres(const Shared& shared, std::span<const BundleView> views, int it
     double* const deviation = arm[views[i].station].data();
     const bool first = !problem.HasParameterBlock(deviation);
     if (first) Eigen::Map<Vector6d>{deviation} = shared.reference.deviations[views[i].station];
-    problem.AddResidualBlock(new ReprojectionCost(shared, views[i]), nullptr, hand_eye.data(),
-                             boards[views[i].board].data(), deviation);
+    std::vector<double*> blocks = {pose(0), pose(1 + views[i].board), deviation};
+    if (shared.intrinsics.count > 0) blocks.push_back(camera);
+    problem.AddResidualBlock(new ReprojectionCost(shared, views[i]), nullptr, blocks);
     if (!first) continue;
     problem.AddResidualBlock(new ArmPrior(shared.noise.arm_sigma), nullptr, deviation);
     options.linear_solver_ordering->AddElementToGroup(deviation, 0);
   }
-  for (Parameters& pose : poses) options.linear_solver_ordering->AddElementToGroup(pose.data(), 1);
+  for (std::size_t k = 0; k < poses; ++k) options.linear_solver_ordering->AddElementToGroup(pose(k), 1);
+  if (shared.intrinsics.count > 0) {
+    problem.AddResidualBlock(new BeliefCost(shared), nullptr, camera);
+    options.linear_solver_ordering->AddElementToGroup(camera, 1);
+  }
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   if (!summary.IsSolutionUsable()) return failure(Fault::kSolveFailed, "least squares: {}", summary.message);
-  result.flange_T_camera = perturb(shared.reference.flange_T_camera, as_vector(hand_eye.data()));
-  for (std::size_t k = 0; k < boards.size(); ++k) {
-    result.base_T_board[k] = perturb(shared.reference.base_T_board[k], as_vector(boards[k].data()));
+  result.camera = moved_camera(shared, camera);
+  result.flange_T_camera = perturb(shared.reference.flange_T_camera, as_vector(pose(0)));
+  for (std::size_t k = 0; k < shared.boards.size(); ++k) {
+    result.base_T_board[k] = perturb(shared.reference.base_T_board[k], as_vector(pose(1 + k)));
   }
   for (std::size_t i = 0; i < arm.size(); ++i) result.deviations[i] = as_vector(arm[i].data());
   return {};
@@ -128,15 +177,14 @@ Status run_ceres(const Shared& shared, std::span<const BundleView> views, int it
 
 }  // namespace
 
-Status solve_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> boards,
-                    std::span<const BundleView> views, const BundleNoise& noise, int iterations_max,
-                    BundleState& state) {
+Status solve_bundle(std::span<const BoardSpec> boards, std::span<const BundleView> views, const BundleNoise& noise,
+                    const IntrinsicsBelief& intrinsics, int iterations_max, BundleState& state) {
   // Refuses what has no image at the start, and with it everything that is not finite.
-  if (const auto start = linearize_bundle(camera, boards, views, noise.corner_sigma_px, state); !start) {
+  if (const auto start = linearize_bundle(boards, views, noise.corner_sigma_px, false, state); !start) {
     return std::unexpected(start.error());
   }
   const BundleState reference = state;
-  const Shared shared{camera, boards, reference, noise};
+  const Shared shared{boards, reference, noise, intrinsics};
   try {
     return run_ceres(shared, views, iterations_max, state);
   } catch (const std::bad_alloc&) {
@@ -144,30 +192,49 @@ Status solve_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> b
   }
 }
 
-Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> boards,
-                                          std::span<const BundleView> views, double corner_sigma_px,
-                                          const BundleState& state) {
+namespace {
+
+/// Adds one view; false when a corner has no image.
+bool linearize_view(const CameraIntrinsics& camera, const ViewGeometry& geometry, const BoardSpec& board,
+                    const BundleView& view, double corner_sigma_px, bool with_intrinsics, LinearizedBundle& result) {
+  ViewNormal normal;
+  IntrinsicsNormal intrinsics;
+  double squared = 0;
+  for (std::size_t i = 0; i < view.points.size(); ++i) {
+    const auto term = corner_term(camera, geometry, board.corner(view.points.point(i)));
+    if (!term) return false;
+    const Eigen::Vector2d residual = view.points.corners_px[i] - term->pixel;
+    const double weight = view.weights[i];
+    const double information = weight / (corner_sigma_px * corner_sigma_px);
+    normal.add(*term, residual, information);
+    if (with_intrinsics) {
+      intrinsics.add(*term, intrinsics_jacobian(camera, term->normalized), residual, information);
+    }
+    squared += weight * residual.squaredNorm();
+    result.weighted_coordinates += 2 * weight;
+  }
+  result.views.push_back(normal);
+  if (with_intrinsics) result.intrinsics.push_back(intrinsics);
+  result.squared_px.push_back(squared);
+  return true;
+}
+
+}  // namespace
+
+Result<LinearizedBundle> linearize_bundle(std::span<const BoardSpec> boards, std::span<const BundleView> views,
+                                          double corner_sigma_px, bool with_intrinsics, const BundleState& state) {
   LinearizedBundle result;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const ViewGeometry geometry{state.flange_T_camera, state.base_T_board[views[v].board],
                                 perturb(views[v].base_T_flange_said, state.deviations[views[v].station])};
-    const BoardSpec& board = boards[views[v].board];
-    ViewNormal normal;
-    double squared = 0;
-    for (std::size_t i = 0; i < views[v].points.size(); ++i) {
-      const auto term = corner_term(camera, geometry, board.corner(views[v].points.point(i)));
-      if (!term) return failure(Fault::kSolveFailed, "view {}: a corner would be behind the camera", v + 1);
-      const Eigen::Vector2d residual = views[v].points.corners_px[i] - term->pixel;
-      const double weight = views[v].weights[i];
-      normal.add(*term, residual, weight / (corner_sigma_px * corner_sigma_px));
-      squared += weight * residual.squaredNorm();
-      result.weighted_coordinates += 2 * weight;
+    if (!linearize_view(state.camera, geometry, boards[views[v].board], views[v], corner_sigma_px, with_intrinsics,
+                        result)) {
+      return failure(Fault::kSolveFailed, "view {}: a corner would be behind the camera", v + 1);
     }
-    if (!normal.global.allFinite() || !normal.arm.allFinite() || !std::isfinite(squared)) {
+    const ViewNormal& normal = result.views.back();
+    if (!normal.global.allFinite() || !normal.arm.allFinite() || !std::isfinite(result.squared_px.back())) {
       return failure(Fault::kSolveFailed, "view {}: numbers are not finite", v + 1);
     }
-    result.views.push_back(normal);
-    result.squared_px.push_back(squared);
   }
   return result;
 }
