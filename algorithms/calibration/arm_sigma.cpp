@@ -52,7 +52,7 @@ std::optional<Eigen::Matrix<double, N, N>> inverse(const Eigen::Matrix<double, N
 /// The same for one board, where sizes are fixed, and for several.
 template <typename Normal>
 std::optional<LinearSolution> solve_normals(std::span<const Normal> views, std::span<const Vector6d> deviations,
-                                            const ArmSigma& sigma) {
+                                            const ArmSigma& sigma, const GlobalPrior& known = {}) {
   constexpr int kGlobal = Normal::kGlobal;
   using Matrix = Eigen::Matrix<double, kGlobal, kGlobal>;
   using Vector = Eigen::Matrix<double, kGlobal, 1>;
@@ -67,6 +67,10 @@ std::optional<LinearSolution> solve_normals(std::span<const Normal> views, std::
     const Eliminated<kGlobal>& e = eliminated.back();
     schur += views[i].global - e.gain * views[i].global_arm.transpose();
     right += views[i].global_right - e.gain * e.right;
+  }
+  if (known.weight.size() == size) {
+    schur.diagonal() += known.weight;
+    right += known.right;
   }
   const auto covariance = inverse<kGlobal>(schur);
   if (!covariance) return std::nullopt;
@@ -90,10 +94,12 @@ std::optional<LinearSolution> solve_normals(std::span<const Normal> views, std::
 
 }  // namespace
 
-StationNormal::StationNormal(int boards)
-    : global(Eigen::MatrixXd::Zero(6 + 6 * boards, 6 + 6 * boards)),
-      global_arm(Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(6 + 6 * boards, 6)),
-      global_right(Eigen::VectorXd::Zero(6 + 6 * boards)) {}
+StationNormal::StationNormal(int boards, int intrinsics) {
+  const Eigen::Index size = 6 + 6 * boards + intrinsics;
+  global.setZero(size, size);
+  global_arm.setZero(size, 6);
+  global_right.setZero(size);
+}
 
 void StationNormal::add(const ViewNormal& view, std::size_t board) {
   const Eigen::Index own = 6 + 6 * static_cast<Eigen::Index>(board);
@@ -109,14 +115,28 @@ void StationNormal::add(const ViewNormal& view, std::size_t board) {
   arm_right += view.arm_right;
 }
 
+void StationNormal::add(const IntrinsicsNormal& view, std::size_t board, int count) {
+  const Eigen::Index own = 6 + 6 * static_cast<Eigen::Index>(board);
+  const Eigen::Index first = global.rows() - count;
+  const auto columns = view.global.leftCols(count);
+  global.block(0, first, 6, count) += columns.topRows<6>();
+  global.block(own, first, 6, count) += columns.bottomRows<6>();
+  global.block(first, 0, count, 6) += columns.topRows<6>().transpose();
+  global.block(first, own, count, 6) += columns.bottomRows<6>().transpose();
+  global.bottomRightCorner(count, count) += view.own.topLeftCorner(count, count);
+  global_arm.bottomRows(count) += view.arm.topRows(count);
+  global_right.tail(count) += view.right.head(count);
+}
+
 std::optional<LinearSolution> solve_linear(std::span<const ViewNormal> views, std::span<const Vector6d> deviations,
                                            const ArmSigma& sigma) {
   return solve_normals(views, deviations, sigma);
 }
 
 std::optional<LinearSolution> solve_linear(std::span<const StationNormal> stations,
-                                           std::span<const Vector6d> deviations, const ArmSigma& sigma) {
-  return solve_normals(stations, deviations, sigma);
+                                           std::span<const Vector6d> deviations, const ArmSigma& sigma,
+                                           const GlobalPrior& prior) {
+  return solve_normals(stations, deviations, sigma, prior);
 }
 
 namespace {
@@ -175,12 +195,13 @@ class Accelerated {
 
 template <typename Normal>
 std::optional<ArmSigma> estimate_sigma(std::span<const Normal> views, std::span<const Vector6d> deviations,
-                                       ArmSigma start, const RefinementOptions& options) {
+                                       ArmSigma start, const RefinementOptions& options,
+                                       const GlobalPrior& prior = {}) {
   constexpr int kIterationsMax = 300;  // a step is about 50 us for 25 views
   constexpr double kChangeMin = 2e-5;
   Accelerated translation, rotation;
   for (int i = 0; i < kIterationsMax; ++i) {
-    const auto solution = solve_linear(views, deviations, start);
+    const auto solution = solve_normals(views, deviations, start, prior);
     if (!solution) return std::nullopt;
     const ArmSigma next = next_arm_sigma(solution->deviations, solution->deviation_covariance, options);
     const double translation_step = std::log(next.translation_m / start.translation_m);
@@ -203,8 +224,8 @@ std::optional<ArmSigma> estimate_arm_sigma(std::span<const ViewNormal> views, st
 
 std::optional<ArmSigma> estimate_arm_sigma(std::span<const StationNormal> stations,
                                            std::span<const Vector6d> deviations, ArmSigma start,
-                                           const RefinementOptions& options) {
-  return estimate_sigma(stations, deviations, start, options);
+                                           const RefinementOptions& options, const GlobalPrior& prior) {
+  return estimate_sigma(stations, deviations, start, options, prior);
 }
 
 }  // namespace firstlook

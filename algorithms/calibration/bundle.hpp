@@ -1,4 +1,5 @@
-/// The non-linear part of the refinement: reprojection errors of all views and priors on the arm's deviations.
+/// The non-linear part of the refinement: reprojection errors of all views and priors on the arm's deviations and the
+/// camera's intrinsics.
 #pragma once
 
 #include <span>
@@ -20,6 +21,7 @@ struct BundleView {
 
 /// What is solved for.
 struct BundleState {
+  CameraIntrinsics camera;  ///< stays as it is unless intrinsics are solved for
   Pose flange_T_camera = Pose::Identity();
   std::vector<Pose> base_T_board;
   std::vector<Vector6d> deviations;  ///< true flange against said, one for each station
@@ -30,23 +32,24 @@ struct BundleNoise {
   ArmSigma arm_sigma;
 };
 
-/// Minimises the whitened squares from `state` on, at most `iterations_max` steps. Single thread, deterministic.
-/// @return kSolveFailed when a corner has no image at the start, for numbers that are not finite, or when no step
-/// helps; kOutOfMemory
+/// Minimises the whitened squares from `state` on, at most `iterations_max` steps of Levenberg and Marquardt. Single
+/// thread, deterministic.
+/// @return kSolveFailed when a corner has no image at the start, or for numbers that are not finite
 /// @param boards  by BundleView::board
-[[nodiscard]] Status solve_bundle(const CameraIntrinsics& camera, std::span<const BoardSpec> boards,
-                                  std::span<const BundleView> views, const BundleNoise& noise, int iterations_max,
+/// @param intrinsics  what of the camera is solved for, and what is believed of it
+[[nodiscard]] Status solve_bundle(std::span<const BoardSpec> boards, std::span<const BundleView> views,
+                                  const BundleNoise& noise, const IntrinsicsBelief& intrinsics, int iterations_max,
                                   BundleState& state);
 
 /// Normal equations of each view at `state`, weights in 1 / px^2.
 struct LinearizedBundle {
   std::vector<ViewNormal> views;
-  std::vector<double> squared_px;   ///< weighted sum of squared residuals of each view
-  double weighted_coordinates = 0;  ///< two for each corner of weight 1
+  std::vector<IntrinsicsNormal> intrinsics;  ///< one for each view where intrinsics are solved for, else empty
+  std::vector<double> squared_px;            ///< weighted sum of squared residuals of each view
+  double weighted_coordinates = 0;           ///< two for each corner of weight 1
 };
-[[nodiscard]] Result<LinearizedBundle> linearize_bundle(const CameraIntrinsics& camera,
-                                                        std::span<const BoardSpec> boards,
+[[nodiscard]] Result<LinearizedBundle> linearize_bundle(std::span<const BoardSpec> boards,
                                                         std::span<const BundleView> views, double corner_sigma_px,
-                                                        const BundleState& state);
+                                                        bool with_intrinsics, const BundleState& state);
 
 }  // namespace firstlook

@@ -1,5 +1,6 @@
 #include "algorithms/calibration/hand_eye_refinement.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -138,33 +139,50 @@ Layout layout_of(const Targets& targets, std::span<const PosePair> pairs) {
 
 struct Fit {
   Layout layout;
+  IntrinsicsBelief intrinsics;
   BundleState state;
   BundleNoise noise;
   LinearSolution linear;
   LinearizedBundle bundle;
 };
 
-/// The normal equations of all stations, as solve_linear and estimate_arm_sigma take them when there are several
-/// boards.
+/// The normal equations of all stations, as solve_linear and estimate_arm_sigma take them when there are several boards
+/// or intrinsics to solve for.
 std::vector<StationNormal> station_normals(const Fit& fit) {
-  std::vector<StationNormal> stations(fit.layout.stations, StationNormal(static_cast<int>(fit.layout.boards.size())));
+  const int intrinsics = fit.intrinsics.count;
+  std::vector<StationNormal> stations(fit.layout.stations,
+                                      StationNormal(static_cast<int>(fit.layout.boards.size()), intrinsics));
   for (std::size_t i = 0; i < fit.bundle.views.size(); ++i) {
-    stations[fit.layout.station[i]].add(fit.bundle.views[i], fit.layout.board[i]);
+    StationNormal& station = stations[fit.layout.station[i]];
+    station.add(fit.bundle.views[i], fit.layout.board[i]);
+    if (intrinsics > 0) station.add(fit.bundle.intrinsics[i], fit.layout.board[i], intrinsics);
   }
   return stations;
 }
 
-/// One board has equations of fixed size, whose matrices take nothing from the heap.
+/// What is believed of the intrinsics, as rows of the normal equations.
+GlobalPrior prior_of(const Fit& fit) {
+  const Eigen::Index count = fit.intrinsics.count;
+  if (count == 0) return {};
+  GlobalPrior prior;
+  prior.weight.setZero(6 + 6 * static_cast<Eigen::Index>(fit.layout.boards.size()) + count);
+  prior.right = prior.weight;
+  prior.weight.tail(count) = fit.intrinsics.weight.head(count);
+  prior.right.tail(count) = fit.intrinsics.right(fit.state.camera).head(count);
+  return prior;
+}
+
+/// One board and a known camera have equations of fixed size, whose matrices take nothing from the heap.
+bool has_fixed_size(const Fit& fit) { return fit.layout.boards.size() == 1 && fit.intrinsics.count == 0; }
+
 std::optional<LinearSolution> solve_linear_of(const Fit& fit, const ArmSigma& sigma) {
-  if (fit.layout.boards.size() == 1) return solve_linear(fit.bundle.views, fit.state.deviations, sigma);
-  return solve_linear(station_normals(fit), fit.state.deviations, sigma);
+  if (has_fixed_size(fit)) return solve_linear(fit.bundle.views, fit.state.deviations, sigma);
+  return solve_linear(station_normals(fit), fit.state.deviations, sigma, prior_of(fit));
 }
 
 std::optional<ArmSigma> arm_sigma_of(const Fit& fit, const ArmSigma& start, const RefinementOptions& options) {
-  if (fit.layout.boards.size() == 1) {
-    return estimate_arm_sigma(fit.bundle.views, fit.state.deviations, start, options);
-  }
-  return estimate_arm_sigma(station_normals(fit), fit.state.deviations, start, options);
+  if (has_fixed_size(fit)) return estimate_arm_sigma(fit.bundle.views, fit.state.deviations, start, options);
+  return estimate_arm_sigma(station_normals(fit), fit.state.deviations, start, options, prior_of(fit));
 }
 
 /// What an estimated sigma must be taken for in a covariance: with v degrees of freedom its square is uncertain, and
@@ -179,25 +197,45 @@ ArmSigma as_unsure(ArmSigma sigma, const Layout& layout, const RefinementOptions
   return sigma;
 }
 
+IntrinsicsFit intrinsics_of(const Fit& fit) {
+  const Eigen::Index count = fit.intrinsics.count;
+  IntrinsicsFit intrinsics;
+  intrinsics.count = fit.intrinsics.count;
+  intrinsics.covariance.topLeftCorner(count, count) = fit.linear.covariance.bottomRightCorner(count, count);
+  intrinsics.untold = untold_distortion(fit.intrinsics, intrinsics.sigma());
+  return intrinsics;
+}
+
+/// Singular normal equations: the camera's fault when they are not without its intrinsics, else the motion's.
+std::unexpected<Error> undetermined(const Fit& fit) {
+  Fit known = fit;
+  known.intrinsics = {};
+  if (fit.intrinsics.count > 0 && solve_linear_of(known, fit.noise.arm_sigma)) {
+    return failure(Fault::kIntrinsicsUnknown, "{} views leave focal lengths and centre open", fit.bundle.views.size());
+  }
+  return failure(Fault::kDegenerateMotion, "the views leave a direction undetermined");
+}
+
 /// Rounds of solving and estimating the sigmas, until these settle.
-Result<Fit> fit_bundle(const CameraIntrinsics& camera, std::span<const BundleView> views, Fit fit,
-                       const RefinementOptions& options) {
+Result<Fit> fit_bundle(std::span<const BundleView> views, Fit fit, const RefinementOptions& options) {
   constexpr double kSettled = 0.003;  // relative change of a sigma
   for (int round = 0; round < options.rounds_max; ++round) {
-    const Status solved = solve_bundle(camera, fit.layout.boards, views, fit.noise, options.iterations_max, fit.state);
+    const Status solved =
+        solve_bundle(fit.layout.boards, views, fit.noise, fit.intrinsics, options.iterations_max, fit.state);
     if (!solved) return std::unexpected(solved.error());
-    auto bundle = linearize_bundle(camera, fit.layout.boards, views, fit.noise.corner_sigma_px, fit.state);
+    auto bundle =
+        linearize_bundle(fit.layout.boards, views, fit.noise.corner_sigma_px, fit.intrinsics.count > 0, fit.state);
     if (!bundle) return std::unexpected(bundle.error());
     fit.bundle = std::move(*bundle);
     const BundleNoise before = fit.noise;
     const bool last = round + 1 == options.rounds_max;
     if (!last) {
       const auto arm = arm_sigma_of(fit, before.arm_sigma, options);
-      if (!arm) return failure(Fault::kDegenerateMotion, "the views leave a direction undetermined");
+      if (!arm) return undetermined(fit);
       fit.noise.arm_sigma = *arm;
     }
     const auto linear = solve_linear_of(fit, fit.noise.arm_sigma);
-    if (!linear) return failure(Fault::kDegenerateMotion, "the views leave a direction undetermined");
+    if (!linear) return undetermined(fit);
     fit.linear = *linear;
     if (last) break;
     if (options.corner_sigma_px <= 0) {
@@ -213,6 +251,9 @@ Result<Fit> fit_bundle(const CameraIntrinsics& camera, std::span<const BundleVie
   }
   const auto unsure = solve_linear_of(fit, as_unsure(fit.noise.arm_sigma, fit.layout, options));
   if (unsure) fit.linear.covariance = unsure->covariance;
+  if (fit.intrinsics.count == 0) return fit;
+  const std::string open = undetermined_intrinsics(fit.state.camera, intrinsics_of(fit).sigma());
+  if (!open.empty()) return failure(Fault::kIntrinsicsUnknown, "{} views do not tell {}", views.size(), open);
   return fit;
 }
 
@@ -227,6 +268,8 @@ Result<Fit> fit_views(const CameraIntrinsics& camera, const Targets& targets, st
   }
   Fit fit;
   fit.layout = layout_of(targets, pairs);
+  fit.intrinsics = belief_of(options.intrinsics, options.intrinsics_prior);
+  fit.state.camera = camera;
   std::vector<BundleView> views;
   for (std::size_t i = 0; i < used.size(); ++i) {
     views.push_back({used[i].pair.base_T_flange.pose(), given[used[i].index].points(), used[i].weights,
@@ -240,7 +283,7 @@ Result<Fit> fit_views(const CameraIntrinsics& camera, const Targets& targets, st
                                   ? options.corner_sigma_px
                                   : std::max(options.corner_sigma_min_px, robust_corner_sigma(used));
   fit.noise.arm_sigma = rough_arm_sigma(pairs, start, options);
-  return fit_bundle(camera, views, std::move(fit), options);
+  return fit_bundle(views, std::move(fit), options);
 }
 
 /// Poses of the boards with what the linear solution says of them.
@@ -258,6 +301,8 @@ void report_targets(const Fit& fit, int targets, Refinement& result) {
 
 Refinement report(const Fit& fit, std::span<const PreparedView> used, int targets, std::size_t given) {
   Refinement result;
+  result.camera = fit.state.camera;
+  if (fit.intrinsics.count > 0) result.intrinsics = intrinsics_of(fit);
   result.flange_T_camera = Transform<Flange, Camera>(fit.state.flange_T_camera);
   result.base_T_board = Transform<Base, Board>(fit.state.base_T_board.front());
   result.covariance = fit.linear.covariance.topLeftCorner<6, 6>();
@@ -291,6 +336,16 @@ std::vector<PreparedView> without_gated(std::span<const PreparedView> views, con
     if (keep[i]) kept.push_back(views[i]);
   }
   return kept;
+}
+
+/// True when the corners were weighed under a camera that is further from the solution than the views tell.
+bool camera_moved(const CameraIntrinsics& weighed_with, const Fit& fit) {
+  if (fit.intrinsics.count == 0) return false;
+  const Eigen::Index count = fit.intrinsics.count;
+  const Eigen::VectorXd step =
+      (intrinsics_vector(fit.state.camera) - intrinsics_vector(weighed_with)).head(count).eval();
+  const Eigen::MatrixXd covariance = fit.linear.covariance.bottomRightCorner(count, count);
+  return step.dot(covariance.ldlt().solve(step)) > static_cast<double>(count);
 }
 
 bool same_views(std::span<const PreparedView> a, std::span<const PreparedView> b) {
@@ -333,21 +388,28 @@ Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const Targets
                                    std::span<const CalibrationView> views, const Transform<Flange, Camera>& start,
                                    const RefinementOptions& options) {
   if (const Status fine = check_input(camera, targets, views, start); !fine) return std::unexpected(fine.error());
+  CameraIntrinsics camera_now = camera;
   std::vector<PreparedView> prepared = prepare(camera, targets, views, start, options);
   if (prepared.size() < 3) {
     return failure(Fault::kTooFewViews, "{} of {} views show the board, 3 are the least", prepared.size(),
                    views.size());
   }
-  // Views are gated with the start's transform, then once more with the better one that came of it.
+  // Views are gated with the start's transform, then once more with the better one that came of it. Another camera
+  // weighs the corners anew, too.
   auto hand_eye = start;
   std::vector<PreparedView> used = without_gated(prepared, hand_eye, options.view_gate);
   constexpr int kGatingsMax = 3;
   for (int gating = 1;; ++gating) {
-    const auto fit = fit_views(camera, targets, views, used, hand_eye, options);
+    const auto fit = fit_views(camera_now, targets, views, used, hand_eye, options);
     if (!fit) return std::unexpected(fit.error());
     hand_eye = Transform<Flange, Camera>(fit->state.flange_T_camera);
+    const bool moved = camera_moved(camera_now, *fit);
+    camera_now = fit->state.camera;
+    if (moved) prepared = prepare(camera_now, targets, views, hand_eye, options);
     std::vector<PreparedView> again = without_gated(prepared, hand_eye, options.view_gate);
-    if (gating == kGatingsMax || same_views(again, used)) return report(*fit, used, targets.size(), views.size());
+    if (gating == kGatingsMax || (!moved && same_views(again, used))) {
+      return report(*fit, used, targets.size(), views.size());
+    }
     used = std::move(again);
   }
 }

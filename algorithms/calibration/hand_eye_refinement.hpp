@@ -1,5 +1,5 @@
-/// Joint least squares over the hand-eye transform, the poses of one board or several, and a deviation of the arm at
-/// each place of it.
+/// Joint least squares over the hand-eye transform, the poses of one board or several, a deviation of the arm at each
+/// place of it, and the camera's intrinsics when they are asked for.
 #pragma once
 
 #include <optional>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algorithms/calibration/calibration_view.hpp"
+#include "algorithms/calibration/intrinsics_prior.hpp"
 #include "algorithms/vision/target_set.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
@@ -33,6 +34,9 @@ struct RefinementOptions {
   double view_gate = 6.0;          ///< views whose misfit is more than this many robust sigmas are left out
   int rounds_max = 8;              ///< of solving and estimating sigmas; 1 with both sigmas given is a short refinement
   int iterations_max = 30;         ///< of Levenberg-Marquardt in each round
+  /// What of the camera is solved for, from the given one on; the rest of it is taken as exact.
+  EstimatedIntrinsics intrinsics = EstimatedIntrinsics::kNone;
+  std::optional<IntrinsicsPrior> intrinsics_prior;
 };
 
 /// What became of one view.
@@ -56,17 +60,20 @@ struct MutualPose {
 };
 
 struct Refinement {
+  CameraIntrinsics camera;                  ///< as given, or as estimated
+  std::optional<IntrinsicsFit> intrinsics;  ///< when they were estimated
   Transform<Flange, Camera> flange_T_camera;
   Transform<Base, Board> base_T_board;           ///< of the first target that was solved
   Matrix6d covariance = Matrix6d::Zero();        ///< of flange_T_camera, see pose_difference
   Matrix6d board_covariance = Matrix6d::Zero();  ///< of base_T_board
   double corner_sigma_px = 0;
   ArmSigma arm_sigma;
-  double reprojection_rms_px = 0;    ///< over the used views, for each coordinate; 0 when there were no corners
-  std::vector<ViewFit> views;        ///< one for each input view
-  int views_used = 0;                ///< places of the arm with a used view
-  std::vector<TargetPose> targets;   ///< one for each target given
-  Eigen::MatrixXd joint_covariance;  ///< of flange_T_camera, then base_T_board of each solved target in their order
+  double reprojection_rms_px = 0;   ///< over the used views, for each coordinate; 0 when there were no corners
+  std::vector<ViewFit> views;       ///< one for each input view
+  int views_used = 0;               ///< places of the arm with a used view
+  std::vector<TargetPose> targets;  ///< one for each target given
+  /// Of flange_T_camera, then base_T_board of each solved target in their order, then the estimated intrinsics.
+  Eigen::MatrixXd joint_covariance;
 };
 
 /// Pose of target `to` in `from` with its covariance, correlations included; empty unless both were solved.
@@ -79,8 +86,10 @@ struct Refinement {
 /// Several targets are solved together, seen in any subsets: each view counts for the hand-eye transform through the
 /// other views of its target, views of one station share their deviation. A target's only view tells where it is and
 /// nothing of the hand-eye; a target without a usable view is left out of `targets`.
+/// With intrinsics estimated (about 150 ms for the same views) every covariance holds what they leave open; views that
+/// leave focal lengths or centre open give no result.
 /// @return kTooFewViews below 3 views; kDataMalformed for numbers that are not finite or wrong counts;
-/// kDegenerateMotion when the normal equations are singular; kSolveFailed
+/// kDegenerateMotion when the normal equations are singular; kIntrinsicsUnknown with what cannot be told; kSolveFailed
 [[nodiscard]] Result<Refinement> refine_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                                  std::span<const CalibrationView> views,
                                                  const Transform<Flange, Camera>& start,

@@ -1,7 +1,5 @@
 #include "algorithms/calibration/reprojection_terms.hpp"
 
-#include "algorithms/vision/camera_model.hpp"
-
 namespace firstlook {
 
 std::optional<CornerTerm> corner_term(const CameraIntrinsics& camera, const ViewGeometry& geometry,
@@ -18,6 +16,7 @@ std::optional<CornerTerm> corner_term(const CameraIntrinsics& camera, const View
   const Eigen::Matrix<double, 2, 3> by_base = by_flange * geometry.base_T_flange.linear().transpose();
   CornerTerm term;
   term.pixel = projected->pixel;
+  term.normalized = projected->normalized;
   term.d_hand_eye << -by_flange, by_flange * cross_matrix(from_camera);
   term.d_board << by_base, -by_base * cross_matrix(turned);
   term.d_arm << -by_base, by_base * cross_matrix(from_flange);
@@ -32,6 +31,16 @@ void ViewNormal::add(const CornerTerm& term, const Eigen::Vector2d& residual, do
   arm.noalias() += weight * term.d_arm.transpose() * term.d_arm;
   global_right.noalias() += weight * j.transpose() * residual;
   arm_right.noalias() += weight * term.d_arm.transpose() * residual;
+}
+
+void IntrinsicsNormal::add(const CornerTerm& term, const IntrinsicsJacobian& by_intrinsics,
+                           const Eigen::Vector2d& residual, double weight) {
+  const Eigen::Matrix<double, 9, 2> weighted = weight * by_intrinsics.transpose();
+  global.topRows<6>().noalias() += term.d_hand_eye.transpose() * weighted.transpose();
+  global.bottomRows<6>().noalias() += term.d_board.transpose() * weighted.transpose();
+  arm.noalias() += weighted * term.d_arm;
+  own.noalias() += weighted * by_intrinsics;
+  right.noalias() += weighted * residual;
 }
 
 }  // namespace firstlook

@@ -46,6 +46,28 @@ Eigen::Matrix2d distort_jacobian(const CameraIntrinsics& camera, const Eigen::Ve
   return j;
 }
 
+IntrinsicsJacobian intrinsics_jacobian(const CameraIntrinsics& camera, const Eigen::Vector2d& normalized) {
+  const double x = normalized.x(), y = normalized.y();
+  const double r2 = x * x + y * y;
+  const Eigen::Vector2d distorted = distort(camera, normalized);
+  IntrinsicsJacobian j;
+  j.row(0) << distorted.x(), 0, 1, 0, x * r2, x * r2 * r2, 2 * x * y, r2 + 2 * x * x, x * r2 * r2 * r2;
+  j.row(1) << 0, distorted.y(), 0, 1, y * r2, y * r2 * r2, r2 + 2 * y * y, 2 * x * y, y * r2 * r2 * r2;
+  j.row(0).tail<5>() *= camera.fx;
+  j.row(1).tail<5>() *= camera.fy;
+  return j;
+}
+
+IntrinsicsVector intrinsics_vector(const CameraIntrinsics& c) {
+  IntrinsicsVector numbers;
+  numbers << c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3;
+  return numbers;
+}
+
+CameraIntrinsics with_intrinsics(const CameraIntrinsics& camera, const IntrinsicsVector& n) {
+  return {camera.width, camera.height, n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8]};
+}
+
 std::optional<Eigen::Vector2d> project(const CameraIntrinsics& camera, const Eigen::Vector3d& point_m) {
   if (!point_m.allFinite() || point_m.z() < kProjectionDepthMin_m) return std::nullopt;
   const Eigen::Vector2d normalized = point_m.head<2>() / point_m.z();
@@ -63,7 +85,8 @@ std::optional<ProjectionJacobian> project_with_jacobian(const CameraIntrinsics& 
   Eigen::Matrix<double, 2, 3> d_normalized;
   d_normalized << inverse, 0, -normalized.x() * inverse, 0, inverse, -normalized.y() * inverse;
   const Eigen::Vector2d focal(camera.fx, camera.fy);
-  return ProjectionJacobian{*pixel, focal.asDiagonal() * distort_jacobian(camera, normalized) * d_normalized};
+  return ProjectionJacobian{*pixel, normalized,
+                            focal.asDiagonal() * distort_jacobian(camera, normalized) * d_normalized};
 }
 
 std::optional<Eigen::Vector2d> undistort(const CameraIntrinsics& camera, const Eigen::Vector2d& pixel) {

@@ -11,9 +11,15 @@ namespace firstlook {
 /// Points nearer than this to the camera's plane, or behind it, have no image.
 inline constexpr double kProjectionDepthMin_m = 1e-6;
 
+/// The numbers of a camera in the order fx, fy, cx, cy (px), k1, k2, p1, p2, k3.
+using IntrinsicsVector = Eigen::Matrix<double, 9, 1>;
+/// Derivative of a pixel by them.
+using IntrinsicsJacobian = Eigen::Matrix<double, 2, 9>;
+
 /// A pixel with its derivative by the point in camera coordinates (px for each metre).
 struct ProjectionJacobian {
   Eigen::Vector2d pixel;
+  Eigen::Vector2d normalized;  ///< the point's x/z, y/z
   Eigen::Matrix<double, 2, 3> d_pixel_d_point;
 };
 
@@ -22,6 +28,13 @@ struct ProjectionJacobian {
 
 /// The 2x2 derivative of distort().
 [[nodiscard]] Eigen::Matrix2d distort_jacobian(const CameraIntrinsics& camera, const Eigen::Vector2d& normalized);
+
+/// How the pixel of a normalised image point changes with the camera's numbers.
+[[nodiscard]] IntrinsicsJacobian intrinsics_jacobian(const CameraIntrinsics& camera, const Eigen::Vector2d& normalized);
+
+/// The camera's numbers as a vector, and a camera of the same picture size with other numbers.
+[[nodiscard]] IntrinsicsVector intrinsics_vector(const CameraIntrinsics& camera);
+[[nodiscard]] CameraIntrinsics with_intrinsics(const CameraIntrinsics& camera, const IntrinsicsVector& numbers);
 
 /// The pixel (centres at integers, it may lie outside the image) where the camera sees a point given in metres in its
 /// optical frame. Empty for a point behind the camera, not finite, or so far out that the distortion polynomial has

@@ -31,6 +31,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kCalibrationRejected,    2007, kRefusal,  "calibration rejected",                 "See the reasons in the report; check the mount, the board and its size.") \
   X(kBoardMoved,             2008, kRefusal,  "the board moved during the job",       "Fix the board and the cart, then start again.") \
   X(kCameraOnInnerLink,      2009, kRefusal,  "the camera is not on the last link",   "Mount the camera on the flange: only that is calibrated so far.") \
+  X(kIntrinsicsUnknown,      2010, kRefusal,  "the views do not determine the camera's intrinsics", "Add views that are tilted by 20 to 40 degrees to all sides and cover the whole picture, or give a camera_info.yaml.") \
   X(kMapTooLarge,            3001, kRefusal,  "the map does not fit its memory",      "Choose a coarser resolution or smaller extents.") \
   X(kFrameRefused,           3002, kNotice,   "depth frame refused",                  "Check the depth stream: size, scale and time stamps.") \
   X(kMapUnreadable,          3003, kRefusal,  "map file unreadable",                  "Use a .bt or .ot file that OctoMap can read.") \

@@ -64,7 +64,7 @@ inline constexpr std::array kBudget = {
     BudgetRow{Pool::kApplication,      "application",         1,  4 * kMiB,         "loop",        "machine, guardian, records of phases, stops and views"},
     BudgetRow{Pool::kReportBuffers,    "report buffers",      1,  16 * kMiB,        "report",      "pictures and text of the report; pictures of calibration views"},
     BudgetRow{Pool::kThreadStacks,     "thread stacks",       kThreadsMax, kThreadStackBytes, "all", "created at boot"},
-    BudgetRow{Pool::kJobHeap,          "job heap allowance",  2,  kJobHeapBytes,    "jobs",        "what OpenCV and Ceres allocate inside a job; more fails the job"},
+    BudgetRow{Pool::kJobHeap,          "job heap allowance",  2,  kJobHeapBytes,    "jobs",        "what OpenCV and Eigen allocate inside a job; more fails the job"},
     BudgetRow{Pool::kLibraryPages,     "library pages",       1,  45 * kMiB,        "all",         "code and data of the shared libraries under mlockall, as measured"},
 };
 // clang-format on
