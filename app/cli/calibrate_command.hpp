@@ -12,6 +12,7 @@ struct CalibrateCommandOptions {
   bool json = false;
   std::string detector = "default";  ///< find_detector_preset
   std::string out = {};              ///< folder for the files; empty: none
+  std::string intrinsics = {};       ///< given | estimate; empty: given where there is a camera_info.yaml
   std::string arm = {};              ///< find_arm_model; empty: not known, and no job takes hand_eye.yaml up
 };
 

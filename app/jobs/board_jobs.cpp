@@ -91,7 +91,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   if (arguments.purpose == BoardLook::kVerify) ++verification_looks_;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
+  const auto pose = estimate_board_pose(camera(), board_, *corners);
   if (!pose) return result;
   result.found = true;
   result.rms_px = pose->residual_rms_px;
@@ -126,7 +126,7 @@ CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   if (!hand_eye_) return result;
   const auto corners = averaged_corners(arguments);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
+  const auto pose = estimate_board_pose(camera(), board_, *corners);
   if (!pose) return result;
   result.seen = true;
   const auto base_T_flange = forward(arm_, arguments.frames.back().at_rad).flange();
