@@ -49,10 +49,14 @@ std::optional<Eigen::Matrix<double, N, N>> inverse(const Eigen::Matrix<double, N
   return Matrix((result + result.transpose()) / 2);
 }
 
+/// Which figures are asked for: those that lead to the next sigma, or all.
+enum class Figures : std::uint8_t { kDeviations, kAll };
+
 /// The same for one board, where sizes are fixed, and for several.
 template <typename Normal>
 std::optional<LinearSolution> solve_normals(std::span<const Normal> views, std::span<const Vector6d> deviations,
-                                            const ArmSigma& sigma, const GlobalPrior& known = {}) {
+                                            const ArmSigma& sigma, const GlobalPrior& known = {},
+                                            Figures figures = Figures::kAll) {
   constexpr int kGlobal = Normal::kGlobal;
   using Matrix = Eigen::Matrix<double, kGlobal, kGlobal>;
   using Vector = Eigen::Matrix<double, kGlobal, 1>;
@@ -84,6 +88,7 @@ std::optional<LinearSolution> solve_normals(std::span<const Normal> views, std::
     solution.deviations.push_back(deviations[i] + own);
     const Matrix6d spread = e.arm_inverse + e.gain.transpose() * *covariance * e.gain;
     solution.deviation_covariance.push_back(spread);
+    if (figures != Figures::kAll) continue;
     const Eigen::Matrix<double, kGlobal, 6> cross = -*covariance * e.gain;
     solution.effective_parameters += (views[i].global * *covariance).trace() +
                                      2 * (views[i].global_arm.transpose() * cross).trace() +
@@ -174,21 +179,26 @@ ArmSigma next_arm_sigma(std::span<const Vector6d> deviations, std::span<const Ma
 namespace {
 
 /// Expectation maximisation creeps where its steps shrink by the same factor each time, and all the more towards a
-/// sigma of zero: the sum of the steps to come is taken at once (Aitken 1926), bounded.
+/// sigma of zero: the sum of the steps to come is taken at once (Aitken 1926), bounded. Starts are too large rather
+/// than too small: a leap to several times the start is none that the data asked for.
 class Accelerated {
  public:
+  explicit Accelerated(double start) : log_start_(std::log(start)) {}
+
   /// log sigma after the step that expectation maximisation makes.
   double next(double log_sigma, double log_step) {
     constexpr double kFactorMax = 30;
+    constexpr double kLogRiseMax = 1.1;  // to three times the start
     const double shrinking = last_step_ == 0 ? 0 : log_step / last_step_;
     const bool steady = shrinking > 0 && shrinking < 1 && !extrapolated_;
     const double factor = steady ? std::min(kFactorMax, 1 / (1 - shrinking)) : 1;
     extrapolated_ = factor > 1;  // the step after a leap says nothing of the shrinking
     last_step_ = log_step;
-    return log_sigma + factor * log_step;
+    return std::min(log_sigma + factor * log_step, std::max(log_start_ + kLogRiseMax, log_sigma + log_step));
   }
 
  private:
+  double log_start_;
   double last_step_ = 0;
   bool extrapolated_ = false;
 };
@@ -199,9 +209,9 @@ std::optional<ArmSigma> estimate_sigma(std::span<const Normal> views, std::span<
                                        const GlobalPrior& prior = {}) {
   constexpr int kIterationsMax = 300;  // a step is about 50 us for 25 views
   constexpr double kChangeMin = 2e-5;
-  Accelerated translation, rotation;
+  Accelerated translation(start.translation_m), rotation(start.rotation_rad);
   for (int i = 0; i < kIterationsMax; ++i) {
-    const auto solution = solve_normals(views, deviations, start, prior);
+    const auto solution = solve_normals(views, deviations, start, prior, Figures::kDeviations);
     if (!solution) return std::nullopt;
     const ArmSigma next = next_arm_sigma(solution->deviations, solution->deviation_covariance, options);
     const double translation_step = std::log(next.translation_m / start.translation_m);

@@ -48,14 +48,13 @@ std::string untold_distortion(const IntrinsicsBelief& belief, const IntrinsicsVe
   return names;
 }
 
-std::string undetermined_intrinsics(const CameraIntrinsics& camera, const IntrinsicsVector& sigma) {
-  constexpr double kShareMax = 0.05;
+std::string undetermined_intrinsics(const CameraIntrinsics& camera, const IntrinsicsVector& sigma, double share_max) {
   const std::array<double, 4> scale = {camera.fx, camera.fy, static_cast<double>(camera.width),
                                        static_cast<double>(camera.width)};
   std::string names;
   for (Eigen::Index i = 0; i < kPinhole; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    if (sigma[i] <= kShareMax * scale[at]) continue;
+    if (sigma[i] <= share_max * scale[at]) continue;
     names += fmt::format("{}{} (sigma {:.0f} px)", names.empty() ? "" : ", ", kNames[at], sigma[i]);
   }
   return names;

@@ -52,8 +52,9 @@ struct IntrinsicsFit {
 /// Names what is unsure by more than half of what was believed before.
 [[nodiscard]] std::string untold_distortion(const IntrinsicsBelief& belief, const IntrinsicsVector& sigma);
 
-/// Names focal lengths and centre whose sigma exceeds 5 % of the focal length or of the picture's width, with their
-/// sigmas: there the linear prediction of the errors ends. Empty when they are told.
-[[nodiscard]] std::string undetermined_intrinsics(const CameraIntrinsics& camera, const IntrinsicsVector& sigma);
+/// Names focal lengths and centre whose sigma exceeds a share of the focal length or of the picture's width, with their
+/// sigmas: beyond 5 % the linear prediction of the errors ends. Empty when they are told.
+[[nodiscard]] std::string undetermined_intrinsics(const CameraIntrinsics& camera, const IntrinsicsVector& sigma,
+                                                  double share_max = 0.05);
 
 }  // namespace firstlook

@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "algorithms/calibration/board_ambiguity.hpp"
+#include "algorithms/calibration/intrinsics_misfit.hpp"
 #include "algorithms/calibration/mistakes/placement_mistakes.hpp"
 #include "algorithms/calibration/unobservable.hpp"
 #include "algorithms/calibration/view_gate.hpp"
@@ -203,8 +204,22 @@ void name_mistake(std::span<const PosePair> pairs, const BoardSpec* board, const
   }
 }
 
+/// Rejects a calibration whose views tell that the given intrinsics lead it astray.
+void name_wrong_intrinsics(const CameraIntrinsics& given, const Targets& targets,
+                           std::span<const CalibrationView> views, const HandEyeOptions& options,
+                           HandEyeResult& result) {
+  const std::string text =
+      intrinsics_misfit(given, targets, views, options.refinement, {result.flange_T_camera, result.covariance});
+  if (text.empty()) return;
+  result.likely_mistake = LikelyMistake{Mistake::kIntrinsics, "likely mistake: " + text, {}, {}};
+  result.reasons.push_back(result.likely_mistake->text);
+  result.verdict = Verdict::kRejected;
+}
+
 HandEyeResult start_result(const Refinement& refinement, std::span<const PosePair> used_pairs) {
   HandEyeResult result;
+  result.camera = refinement.camera;
+  result.intrinsics = refinement.intrinsics;
   result.flange_T_camera = refinement.flange_T_camera;
   result.base_T_board = refinement.base_T_board;
   result.targets = refinement.targets;
@@ -330,14 +345,16 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Targe
   const auto refinement = refine_hand_eye(camera, targets, views, start->flange_T_camera, options.refinement);
   if (!refinement) return name_unobservable(refinement.error(), seen.pairs);
   HandEyeResult result = start_result(
-      *refinement, select_views(camera, targets, views, refinement->views, refinement->flange_T_camera).pairs);
+      *refinement,
+      select_views(refinement->camera, targets, views, refinement->views, refinement->flange_T_camera).pairs);
   result.closed_form = start->flange_T_camera;
   result.closed_form_raw = start->raw_flange_T_camera;
   return result;
 }
 
-void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
+void validate_hand_eye(const CameraIntrinsics& given, const Targets& targets, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result) {
+  const CameraIntrinsics& camera = result.intrinsics ? result.camera : given;
   const UsedViews used = select_views(camera, targets, views, result.fits, result.flange_T_camera);
   const RefinementOptions quick = short_options(options, result);
   Validation validation;
@@ -355,7 +372,7 @@ void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, s
   };
   validation.squared_px = [&](std::size_t i, const Refinement& r) {
     const auto target = static_cast<std::size_t>(used.views[i].target);
-    return squared_error_px(camera, targets[used.views[i].target], used.views[i], r.flange_T_camera,
+    return squared_error_px(r.camera, targets[used.views[i].target], used.views[i], r.flange_T_camera,
                             r.targets[target].base_T_board);
   };
   validate(validation, options, result);
@@ -365,6 +382,7 @@ void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, s
   } else {
     name_mistake_of_targets(camera, targets, views, all, result);
   }
+  if (!result.likely_mistake && !result.intrinsics) name_wrong_intrinsics(given, targets, used.views, options, result);
 }
 
 std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const Targets& targets,

@@ -41,12 +41,14 @@ enum class Verdict : std::uint8_t { kAccepted, kRejected };
 
 /// Everything that result.json's hand_eye object says, and what the report shows beside it.
 struct HandEyeResult {
+  CameraIntrinsics camera;                    ///< that everything holds for: as given, or as estimated
+  std::optional<IntrinsicsFit> intrinsics{};  ///< when they were estimated (RefinementOptions::intrinsics)
   Transform<Flange, Camera> flange_T_camera;
   Transform<Flange, Camera> closed_form;      ///< what the chosen solver alone gave: the refinement's start
   std::optional<Matrix3x4d> closed_form_raw;  ///< the same before its rotation was made one, by the linear solvers
   Transform<Base, Board> base_T_board;        ///< of the first target that was solved
   std::vector<TargetPose> targets;            ///< one for each target given
-  Eigen::MatrixXd joint_covariance;           ///< of flange_T_camera and all solved targets, see Refinement
+  Eigen::MatrixXd joint_covariance;           ///< of flange_T_camera, all solved targets and intrinsics, see Refinement
   Matrix6d covariance = Matrix6d::Zero();     ///< of flange_T_camera: pose_difference, m and rad, flange axes
   Matrix6d board_covariance = Matrix6d::Zero();
   Eigen::Vector3d sigma_translation_m = Eigen::Vector3d::Zero();
@@ -90,7 +92,8 @@ struct HandEyeResult {
                                                                   const HandEyeOptions& options = {});
 
 /// The two halves of calibrate_hand_eye for a job that solves first and validates later: the first leaves holdout,
-/// subsets and usable distance unset and the verdict kRejected, "not validated".
+/// subsets and usable distance unset and the verdict kRejected, "not validated". Validation takes the same camera as
+/// was given to the solve; where that was to be estimated, each of its solves estimates it anew.
 [[nodiscard]] Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                                    std::span<const CalibrationView> views,
                                                    const HandEyeOptions& options = {});

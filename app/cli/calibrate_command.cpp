@@ -69,6 +69,17 @@ void print_text(const HandEyeResult& r) {
                  (*raw)(row, 1), (*raw)(row, 2), (*raw)(row, 3));
     }
   }
+  if (r.intrinsics) {
+    const CameraIntrinsics& c = r.camera;
+    const IntrinsicsVector s = r.intrinsics->sigma();
+    fmt::print("intrinsics       fx {:.2f} fy {:.2f} cx {:.2f} cy {:.2f} px  sigma {:.2f} {:.2f} {:.2f} {:.2f}\n", c.fx,
+               c.fy, c.cx, c.cy, s[0], s[1], s[2], s[3]);
+    fmt::print("                 k1 {:.4f} k2 {:.4f} p1 {:.5f} p2 {:.5f}  sigma {:.4f} {:.4f} {:.5f} {:.5f}\n", c.k1,
+               c.k2, c.p1, c.p2, s[4], s[5], s[6], s[7]);
+    if (const std::string& untold = r.intrinsics->untold; !untold.empty()) {
+      fmt::print("                 the views hardly tell {}: they cover too little of the picture\n", untold);
+    }
+  }
   fmt::print("arm sigma        {:.2f} mm  {:.2f} mrad for each axis\n", r.arm_sigma.translation_m * 1e3,
              r.arm_sigma.rotation_rad * 1e3);
   if (!r.from_pairs) {
@@ -131,6 +142,18 @@ int fail_to_solve(const CalibrationDataset& data, const Error& error) {
   return kDataError;
 }
 
+/// What of the camera is to be solved for.
+Result<EstimatedIntrinsics> intrinsics_asked(const std::string& word, const CalibrationDataset& data) {
+  const bool pairs = data.source == CalibrationSource::kPairs;
+  if (pairs && word == "estimate") {
+    return failure(Fault::kUsage, "--intrinsics estimate: pose pairs have no corners to tell them from");
+  }
+  if (data.intrinsics_estimated && word == "given") {
+    return failure(Fault::kUsage, "--intrinsics given: the dataset has no camera_info.yaml");
+  }
+  return word == "estimate" || data.intrinsics_estimated ? EstimatedIntrinsics::kWithoutK3 : EstimatedIntrinsics::kNone;
+}
+
 /// The last part of a folder's name, whatever it ends with.
 std::string name_of_folder(const std::string& folder) {
   const auto path = std::filesystem::path(folder).lexically_normal();
@@ -142,7 +165,7 @@ Status write_files(const CalibrateCommandOptions& options, const CalibrationData
   const HandEyeResult& result = *record.hand_eye;
   const std::string_view arm = options.arm.empty() ? kUnknownArm : std::string_view(options.arm);
   StoredCalibration calibration = stored_calibration(result, solver_name(hand_eye.solver), arm);
-  if (data.source != CalibrationSource::kPairs) calibration.intrinsics = data.camera;
+  if (data.source != CalibrationSource::kPairs) calibration.intrinsics = result.camera;
   std::vector<NamedFile> files = calibration_files(calibration);
   if (calibration.intrinsics.width > 0) {
     files.push_back({"camera_info.yaml", camera_info_yaml(calibration.intrinsics)});
@@ -187,13 +210,17 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
   if (!options.out.empty()) {
     if (const Status fresh = check_run_folder(options.out); !fresh) return fail(fresh.error(), kDataError);
   }
-  const auto data = read_calibration_dataset(options.dataset, preset->detection);
+  auto data = read_calibration_dataset(options.dataset, preset->detection);
   if (!data) return fail(data.error(), kDataError);
   narrate(*data);
+  const auto intrinsics = intrinsics_asked(options.intrinsics, *data);
+  if (!intrinsics) return fail(intrinsics.error(), kUsageError);
+  hand_eye.refinement.intrinsics = *intrinsics;
   const auto result = data->source == CalibrationSource::kPairs
                           ? calibrate_hand_eye_from_pairs(data->pairs, hand_eye)
                           : calibrate_hand_eye(data->camera, boards_of(data->targets), data->views, hand_eye);
   if (!result) return fail_to_solve(*data, result.error());
+  if (result->intrinsics) data->camera = result->camera;  // what all that is written holds for
   narrate_views(*data, *result);
   std::vector<std::string> names;
   for (const NamedTarget& target : data->targets) names.push_back(target.name);

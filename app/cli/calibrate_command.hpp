@@ -6,12 +6,13 @@
 namespace firstlook {
 
 struct CalibrateCommandOptions {
-  std::string dataset;  ///< folder
-  std::string solver;   ///< a name of solver_table(); empty: park-martin
-  bool strict = false;  ///< a rejected calibration is an error
+  std::string dataset;      ///< folder
+  std::string solver = {};  ///< a name of solver_table(); empty: park-martin
+  bool strict = false;      ///< a rejected calibration is an error
   bool json = false;
   std::string detector = "default";  ///< find_detector_preset
   std::string out = {};              ///< folder for the files; empty: none
+  std::string intrinsics = {};       ///< given | estimate; empty: given where there is a camera_info.yaml
   std::string arm = {};              ///< find_arm_model; empty: not known, and no job takes hand_eye.yaml up
 };
 

@@ -80,6 +80,12 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->add_option("--detector", calibrate.detector,
                    "settings of the checkerboard's detection: default, thesis2014 (table D-8), ...")
       ->capture_default_str();
+  calibrate_app
+      ->add_option(
+          "--intrinsics", calibrate.intrinsics,
+          "given: take camera_info.yaml as exact; estimate: solve for the camera's intrinsics together with the "
+          "rest (what happens without camera_info.yaml)")
+      ->check(CLI::IsMember({"given", "estimate"}));
   calibrate_app->add_option(
       "--out", calibrate.out,
       "folder for report.html, result.json, hand_eye.yaml, camera_info.yaml and ros/; must be new "

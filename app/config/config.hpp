@@ -69,6 +69,7 @@ struct Config {
 
   struct Calibration {
     std::string solver = "park-martin";  ///< what starts the joint refinement
+    std::string intrinsics = "given";    ///< given | estimate: together with everything else
     std::string views = "designed";      ///< designed | fixed48: algorithms/view_planning/fixed_views.hpp
     int views_min = 8;
     int views_max = 30;

@@ -80,6 +80,8 @@ constexpr std::array<std::string_view, 2> kYesNo = {"no", "yes"};
 
 constexpr std::array<std::string_view, 2> kCalibrationViews = {"designed", "fixed48"};
 
+constexpr std::array<std::string_view, 2> kIntrinsics = {"given", "estimate"};
+
 void add_calibration_keys(Keys& keys, Config& c) {
   Config::Calibration& k = c.calibration;
   keys.push_back({"board.type", &c.board.type, 0, 0, target_type_names(),
@@ -116,6 +118,8 @@ void add_calibration_keys(Keys& keys, Config& c) {
   keys.push_back({"board.detector", &c.board.detector, 0, 0, detector_preset_names(),
                   "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
+  keys.push_back({"calibration.intrinsics", &k.intrinsics, 0, 0, kIntrinsics,
+                  "of the colour camera. given: as the camera states them; estimate: solved for with the rest"});
   keys.push_back(
       {"calibration.views", &k.views, 0, 0, kCalibrationViews,
        "designed: each for what it adds; fixed48: a list that moves the board over the picture, to compare"});

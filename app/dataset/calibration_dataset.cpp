@@ -335,9 +335,8 @@ Status calibrate_camera(CalibrationDataset& data) {
   data.intrinsics_estimated = true;
   data.intrinsics_rms_px = estimate->reprojection_rms_px;
   data.notes.push_back(
-      fmt::format("no camera_info.yaml: intrinsics calibrated from the same views (fx {:.1f} fy {:.1f} cx {:.1f} cy "
-                  "{:.1f}, RMS {:.2f} "
-                  "px); their uncertainty is not in the hand-eye covariance",
+      fmt::format("no camera_info.yaml: intrinsics are estimated together with the rest, from those that the pictures "
+                  "say by themselves (fx {:.1f} fy {:.1f} cx {:.1f} cy {:.1f}, RMS {:.2f} px) on",
                   estimate->camera.fx, estimate->camera.fy, estimate->camera.cx, estimate->camera.cy,
                   estimate->reprojection_rms_px));
   return {};

@@ -26,8 +26,10 @@ struct CalibrationDataset {
   CalibrationSource source = CalibrationSource::kImages;
   BoardSpec board;                   ///< the first target; with pairs.csv: what board.yaml says, or unset without one
   std::vector<NamedTarget> targets;  ///< all of them; a board.yaml of one target gives it no name
+  /// As camera_info.yaml says; without one as the same images say by themselves (Zhang 2000), which is a start for a
+  /// solve that estimates them.
   CameraIntrinsics camera;
-  bool intrinsics_estimated = false;  ///< no camera_info.yaml: calibrated from the same images (Zhang 2000)
+  bool intrinsics_estimated = false;  ///< no camera_info.yaml
   double intrinsics_rms_px = 0;       ///< of that calibration
   std::vector<CalibrationView> views;
   std::vector<std::string> names;   ///< one for each view

@@ -383,7 +383,7 @@ Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file) {
 }
 
 Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, const CameraIntrinsics& intrinsics,
-                     const Transform<Camera, Depth>& camera_T_depth) {
+                     const Transform<Camera, Depth>& camera_T_depth, bool estimates_intrinsics) {
   constexpr double kSame_px = 0.01, kSameDistortion = 1e-6, kSame_m = 1e-4, kSame_rad = 1e-4;
   if (calibration.arm_model == kUnknownArm) {
     return failure(Fault::kStoredCalibration,
@@ -413,10 +413,10 @@ Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, 
       std::max({std::abs(a.fx - b.fx), std::abs(a.fy - b.fy), std::abs(a.cx - b.cx), std::abs(a.cy - b.cy)});
   const double distortion = std::max({std::abs(a.k1 - b.k1), std::abs(a.k2 - b.k2), std::abs(a.p1 - b.p1),
                                       std::abs(a.p2 - b.p2), std::abs(a.k3 - b.k3)});
-  if (!(px <= kSame_px) || !(distortion <= kSameDistortion)) {
+  if (!estimates_intrinsics && (!(px <= kSame_px) || !(distortion <= kSameDistortion))) {
     return failure(Fault::kStoredCalibration,
                    "it was made with other intrinsics of the colour camera: focal length and centre differ by up to "
-                   "{:.3g} px, distortion by {:.3g}",
+                   "{:.3g} px, distortion by {:.3g}; if they were estimated then, set calibration.intrinsics: estimate",
                    px, distortion);
   }
   if (!calibration.camera_T_depth) return {};  // solved without one: nothing in it depends on where that sits

@@ -50,9 +50,11 @@ struct StoredCalibration {
 /// rejected
 [[nodiscard]] Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file);
 
-/// Whether a calibration was made with this arm, colour camera and depth camera.
+/// Whether a calibration was made with this arm, colour camera and depth camera. Where a cart estimates its intrinsics,
+/// those of the calibration count and only the size of the pictures is compared.
 /// @return kStoredCalibration with what differs
 [[nodiscard]] Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm,
-                                   const CameraIntrinsics& intrinsics, const Transform<Camera, Depth>& camera_T_depth);
+                                   const CameraIntrinsics& intrinsics, const Transform<Camera, Depth>& camera_T_depth,
+                                   bool estimates_intrinsics = false);
 
 }  // namespace firstlook

@@ -104,7 +104,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   result.moved_px = sight.moved_px;
   if (!sight.picture) return result;
   const CornerSet& corners = sight.picture->mean;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, corners);
+  const auto pose = estimate_board_pose(camera(), board_, corners);
   if (!pose) return result;
   result.found = true;
   result.rms_px = pose->residual_rms_px;
@@ -142,7 +142,7 @@ CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   result.still = sight.still;
   result.moved_px = sight.moved_px;
   if (!sight.picture) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, sight.picture->mean);
+  const auto pose = estimate_board_pose(camera(), board_, sight.picture->mean);
   if (!pose) return result;
   result.seen = true;
   const auto base_T_flange = forward(arm_, arguments.frames.back().at_rad).flange();

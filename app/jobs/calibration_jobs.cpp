@@ -31,11 +31,18 @@ ArmSigma Workbench::arm_sigma_expected() const {
   return {config_.calibration.robot_sigma_mm * 1e-3, config_.calibration.robot_sigma_mrad * 1e-3};
 }
 
+const CameraIntrinsics& Workbench::camera() const {
+  if (hand_eye_ && hand_eye_->intrinsics) return hand_eye_->camera;
+  if (facts_.stored && estimates_intrinsics()) return facts_.stored->intrinsics;
+  return color_.intrinsics();
+}
+
 HandEyeOptions Workbench::solve_options() const {
   HandEyeOptions options;
   options.solver = find_solver(config_.calibration.solver).value_or(Solver::kParkMartin);
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.refinement.arm_sigma_expected = arm_sigma_expected();
+  if (estimates_intrinsics()) options.refinement.intrinsics = EstimatedIntrinsics::kWithoutK3;
   VerdictLimits& limits = options.limits;
   limits.views_min = std::min(config_.calibration.views_min, 6);
   limits.sigma_translation_max_m = config_.calibration.sigma_max_mm * 1e-3;
@@ -49,13 +56,14 @@ HandEyeOptions Workbench::solve_options() const {
 }
 
 /// What the views taken so far say about hand-eye and board; empty until they determine it.
-std::optional<ViewDesignModel> Workbench::rough_model() const {
+std::optional<Workbench::RoughModel> Workbench::rough_model() const {
   if (observations_.size() < kBootstrapViews) return std::nullopt;
   std::vector<PosePair> pairs;
   for (const Observation& o : observations_) pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board});
   const auto rough = solve_closed_form(pairs);
   if (!rough) return std::nullopt;
-  ViewDesignModel model;
+  RoughModel result;
+  ViewDesignModel& model = result.model;
   model.camera = color_.intrinsics();
   model.board = board_;
   model.flange_T_camera = *rough;
@@ -69,12 +77,23 @@ std::optional<ViewDesignModel> Workbench::rough_model() const {
   options.rounds_max = measured ? 3 : 1;
   std::vector<CalibrationView> taken;
   for (const Observation& o : observations_) taken.push_back(o.view);
-  if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) {
-    model.flange_T_camera = refined->flange_T_camera;
-    model.base_T_board = refined->base_T_board;
-    model.corner_sigma_px = refined->corner_sigma_px;
+  const auto adopt = [&](const Refinement& refined) {
+    model.camera = refined.camera;
+    model.flange_T_camera = refined.flange_T_camera;
+    model.base_T_board = refined.base_T_board;
+    model.corner_sigma_px = refined.corner_sigma_px;
+    if (refined.intrinsics) result.covariance = refined.covariance;
+  };
+  if (estimates_intrinsics()) {
+    options.intrinsics = EstimatedIntrinsics::kWithoutK3;
+    if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) {
+      adopt(*refined);
+      return result;
+    }
+    options.intrinsics = EstimatedIntrinsics::kNone;  // too few views yet: as if the stated ones were right
   }
-  return model;
+  if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) adopt(*refined);
+  return result;
 }
 
 CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
@@ -104,12 +123,13 @@ CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
 }
 
 CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
-  const auto model = rough_model();
-  if (!model) return next_bootstrap_view(here);
+  const auto rough = rough_model();
+  if (!rough) return next_bootstrap_view(here);
+  const ViewDesignModel& model = rough->model;
   Matrix12d information = prior_information();
   std::vector<JointVector> taken;
   for (const std::size_t i : independent_observations()) {
-    information += view_information(*model, observations_[i].view.base_T_flange);
+    information += view_information(model, observations_[i].view.base_T_flange);
     taken.push_back(observations_[i].joints_rad);
   }
   CalibrationViewOptions options;
@@ -118,13 +138,14 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   options.speed = limits_;
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
-  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, *model, information, taken};
+  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, model, information, taken};
   const bool fixed = config_.calibration.views == "fixed48";
   CalibrationViewResult result;
-  const PredictedSigma sigma = predicted_sigma(predicted_covariance(information));
+  const PredictedSigma sigma = predicted_sigma(rough->covariance.value_or(predicted_covariance(information)));
   result.sigma_mm = 1000 * sigma.translation_m;
   result.sigma_mrad = 1000 * sigma.rotation_rad;
-  result.target_met = !fixed && result.sigma_mm <= config_.calibration.target_sigma_mm &&
+  const bool can_tell = rough->covariance.has_value() || !estimates_intrinsics();
+  result.target_met = can_tell && !fixed && result.sigma_mm <= config_.calibration.target_sigma_mm &&
                       result.sigma_mrad <= config_.calibration.target_sigma_mrad;
   auto choice = fixed ? next_fixed_view(inputs, planner_, here.at_rad, fixed_next_, options)
                       : firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
@@ -178,7 +199,7 @@ ValidateResult Workbench::validate() {
 
 std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
   std::vector<CalibrationViewRecord> records;
-  const CameraIntrinsics& camera = color_.intrinsics();
+  const CameraIntrinsics& camera = this->camera();
   const std::vector<std::size_t> counted = independent_observations();
   for (std::size_t i = 0; i < observations_.size(); ++i) {
     const auto place = std::find(counted.begin(), counted.end(), i);

@@ -10,6 +10,7 @@ namespace {
 /// What the file says, as the result of a job that is still to be verified.
 HandEyeResult result_of(const StoredCalibration& stored, double tolerance_m) {
   HandEyeResult r;
+  r.camera = stored.intrinsics;
   r.flange_T_camera = stored.flange_T_camera;
   r.closed_form = stored.flange_T_camera;
   r.covariance = stored.covariance;
@@ -89,10 +90,12 @@ VerificationViewResult Workbench::next_verification_view(const FromHere& here) {
   std::optional<Path> path;
   if (!observations_.empty()) {
     const HandEyeClaim stated = claim();
-    const ViewDesignModel model{
-        color_.intrinsics(),    board_,
-        stated.flange_T_camera, mean_board_pose(pairs_of(observations_), stated.flange_T_camera),
-        stated.corner_sigma_px, stated.arm_sigma};
+    const ViewDesignModel model{camera(),
+                                board_,
+                                stated.flange_T_camera,
+                                mean_board_pose(pairs_of(observations_), stated.flange_T_camera),
+                                stated.corner_sigma_px,
+                                stated.arm_sigma};
     Matrix12d information = prior_information();
     for (const Observation& o : observations_) information += view_information(model, o.view.base_T_flange);
     const VerificationLimits limits = limits_of(config_);
@@ -118,7 +121,7 @@ VerifyResult Workbench::verify_calibration() {
   hand_eye.reasons = covariance_reasons(solve_options().limits, hand_eye);
   std::vector<CalibrationView> views;
   for (const Observation& o : observations_) views.push_back(o.view);
-  const auto verification = verify_hand_eye(color_.intrinsics(), board_, views, claim(), limits_of(config_));
+  const auto verification = verify_hand_eye(camera(), board_, views, claim(), limits_of(config_));
   if (verification) {
     record.verification = *verification;
     hand_eye.base_T_board = verification->base_T_board;

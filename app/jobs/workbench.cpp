@@ -42,7 +42,8 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
   const auto arm = find_arm_model(config.arm.model);
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
   if (facts.stored) {
-    const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth);
+    const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth,
+                                      config.calibration.intrinsics == "estimate");
     if (!fits) return failure(fits.error().fault, "{}: {}", config.calibration.stored, fits.error().detail());
   }
   const GridGeometry geometry =

@@ -86,6 +86,8 @@ class Workbench {
   [[nodiscard]] SummarizeResult summarize();
 
   // ---- what the report is made of; after the loop has ended
+  /// The colour camera as everything that follows takes it: as it states, or as a calibration estimated it.
+  [[nodiscard]] const CameraIntrinsics& camera() const;
   [[nodiscard]] const std::optional<HandEyeResult>& hand_eye() const { return hand_eye_; }
   [[nodiscard]] const std::optional<ClearanceTerms>& clearance_terms() const { return mapping_terms_; }
   [[nodiscard]] std::vector<CalibrationViewRecord> calibration_records() const;
@@ -141,7 +143,13 @@ class Workbench {
   [[nodiscard]] BoardSight sight_of(const DetectArguments& arguments);
   void keep_picture(std::size_t observation);
   void settle_observations(BoardLook purpose);
-  [[nodiscard]] std::optional<ViewDesignModel> rough_model() const;
+  /// What the views taken so far say; the covariance only where intrinsics are estimated and could be.
+  struct RoughModel {
+    ViewDesignModel model;
+    std::optional<Matrix6d> covariance;
+  };
+  [[nodiscard]] std::optional<RoughModel> rough_model() const;
+  [[nodiscard]] bool estimates_intrinsics() const { return config_.calibration.intrinsics == "estimate"; }
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
   [[nodiscard]] ArmSigma arm_sigma_expected() const;
   [[nodiscard]] HandEyeOptions solve_options() const;

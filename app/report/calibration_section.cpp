@@ -50,6 +50,20 @@ std::string how_it_settled(const SettlingSummary& s) {
   return text;
 }
 
+/// Estimated intrinsics with their sigmas.
+void intrinsics_rows(const CameraIntrinsics& c, const IntrinsicsFit& fit, HtmlTable& table) {
+  const IntrinsicsVector s = fit.sigma();
+  table.row({"focal lengths", fmt::format("{:.2f} ± {:.2f}, {:.2f} ± {:.2f} px", c.fx, s[0], c.fy, s[1]),
+             "estimated together with the rest, ± 1σ; what they leave open is in the sigmas above"});
+  table.row({"centre of the picture", fmt::format("{:.2f} ± {:.2f}, {:.2f} ± {:.2f} px", c.cx, s[2], c.cy, s[3]),
+             "the same"});
+  table.row({"distortion k1, k2", fmt::format("{:.4f} ± {:.4f}, {:.4f} ± {:.4f}", c.k1, s[4], c.k2, s[5]), "the same"});
+  table.row({"distortion p1, p2", fmt::format("{:.5f} ± {:.5f}, {:.5f} ± {:.5f}", c.p1, s[6], c.p2, s[7]),
+             fit.untold.empty()
+                 ? std::string("the same")
+                 : fmt::format("the views hardly tell {}: they cover too little of the picture", fit.untold)});
+}
+
 std::string quality_table(const RunRecord& record) {
   const HandEyeResult& h = *record.hand_eye;
   HtmlTable table({"figure", "value", "what it says"}, 3);
@@ -69,8 +83,10 @@ std::string quality_table(const RunRecord& record) {
   table.row({"the arm's pose noise",
              fmt::format("{:.3f} mm, {:.3f} mrad", h.arm_sigma.translation_m * 1e3, h.arm_sigma.rotation_rad * 1e3),
              "for each axis, estimated from the views"});
-  if (!h.from_pairs)
+  if (!h.from_pairs) {
     table.row({"corner noise", fmt::format("{:.3f} px", h.corner_sigma_px), "estimated from the views"});
+  }
+  if (h.intrinsics) intrinsics_rows(h.camera, *h.intrinsics, table);
   if (const auto settling = settling_of(record.calibration_views)) {
     table.row(
         {"picture at rest", fmt::format("corners scatter {:.3f} px", settling->scatter_px), how_it_settled(*settling)});

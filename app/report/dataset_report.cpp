@@ -91,13 +91,13 @@ std::string targets_section(const RunRecord& record) {
   return section("targets", "Where the targets are", body);
 }
 
-std::string data_section(const CalibrationDataset& data) {
+std::string data_section(const CalibrationDataset& data, bool intrinsics_estimated) {
   std::string body = paragraph(data_text(data) + ".");
   if (data.source != CalibrationSource::kPairs) {
     const CameraIntrinsics& c = data.camera;
     body += paragraph(fmt::format(
         "Camera {}x{}: fx {:.1f}, fy {:.1f}, cx {:.1f}, cy {:.1f} px, {}.", c.width, c.height, c.fx, c.fy, c.cx, c.cy,
-        data.intrinsics_estimated ? "calibrated from the same views" : "as camera_info.yaml says"));
+        intrinsics_estimated ? "estimated from the same views together with the rest" : "as camera_info.yaml says"));
   }
   for (const std::string& note : data.notes) body += paragraph(note + ".");
   return section("data", "What it was solved from", body);
@@ -179,7 +179,8 @@ std::string dataset_report_html(const RunRecord& record, const CalibrationDatase
   if (!record.calibration_views.empty()) html += "<a href=\"#calibration-views\">Views</a>";
   html += "<a href=\"#solvers\">Solvers</a><a href=\"#data\">Data</a></nav>\n";
   html += summary_section(record) + hand_eye_section(record) + targets_section(record) + view_table(record, data);
-  html += calibration_views_section(record) + solver_comparison_section(record) + data_section(data);
+  html += calibration_views_section(record) + solver_comparison_section(record) +
+          data_section(data, record.hand_eye->intrinsics.has_value());
   return html + "</main>\n</body>\n</html>\n";
 }
 

@@ -56,6 +56,21 @@ json mistake_json(const std::optional<LikelyMistake>& mistake) {
           {"misfit_without_it", misfit_json(mistake->after)}};
 }
 
+/// Estimated intrinsics with their sigmas under the names of hand_eye.yaml.
+json intrinsics_json(const CameraIntrinsics& camera, const IntrinsicsFit& fit) {
+  constexpr std::array<const char*, 9> kKeys = {"fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
+  const IntrinsicsVector numbers = intrinsics_vector(camera), sigma = fit.sigma();
+  json object = {{"image_width", camera.width}, {"image_height", camera.height}}, sigmas = json::object();
+  for (std::size_t i = 0; i < kKeys.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    object[kKeys[i]] = numbers[at];
+    sigmas[kKeys[i]] = at < fit.count ? json(sigma[at]) : json(nullptr);
+  }
+  object["sigma"] = std::move(sigmas);
+  object["hardly_told"] = fit.untold.empty() ? json(nullptr) : json(fit.untold);
+  return object;
+}
+
 json rows_or_null(const std::optional<Matrix3x4d>& matrix) {
   if (!matrix) return nullptr;
   json rows = json::array();
@@ -93,6 +108,7 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
                          {"rotation_mrad", result.arm_sigma.rotation_rad * 1e3}};
   object["subset_spread"] = {{"translation_mm", result.subset_spread_m * 1e3},
                              {"rotation_mrad", result.subset_spread_rad * 1e3}};
+  if (result.intrinsics) object["intrinsics"] = intrinsics_json(result.camera, *result.intrinsics);
   // At the top the usual way to state it; the other two are the residual of the equation itself.
   json residual = residual_json(result.board_in_base);
   residual["all_pairs"] = residual_json(result.ax_xb_all_pairs);

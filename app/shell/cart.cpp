@@ -282,7 +282,7 @@ RunRecord Cart::record() const {
   r.decisions_hash = hash_text(journal_->decisions_hash());
   r.hand_eye = bench_->hand_eye();
   r.solver = config_.calibration.solver;
-  r.intrinsics = devices_.color.intrinsics();
+  r.intrinsics = bench_->camera();
   r.camera_T_depth = bench_->facts().camera_T_depth;
   r.verified = bench_->verified();
   r.calibration_views = bench_->calibration_records();

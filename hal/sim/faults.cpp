@@ -9,7 +9,7 @@
 namespace firstlook::sim {
 namespace {
 
-enum class Kind : unsigned char { kShare, kTime, kOffset, kSwitch, kInterval };
+enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kSwitch, kInterval };
 
 struct Knob {
   std::string_view name;
@@ -27,6 +27,8 @@ constexpr std::array kKnobs = {
     Knob{"depth.freeze_at", Kind::kTime, &Faults::depth_freeze_s},
     Knob{"color.clock", Kind::kOffset, &Faults::color_clock_offset_s},
     Knob{"depth.clock", Kind::kOffset, &Faults::depth_clock_offset_s},
+    Knob{"color.focal", Kind::kRelative, &Faults::color_focal_error},
+    Knob{"color.center", Kind::kPixels, &Faults::color_center_error_px},
     Knob{"link.lost_at", Kind::kTime, &Faults::link_lost_s},
     Knob{"arm.protective_stop_at", Kind::kTime, &Faults::protective_stop_s},
     Knob{"arm.emergency_stop_at", Kind::kTime, &Faults::emergency_stop_s},
@@ -80,6 +82,12 @@ bool set_knob(const Knob& knob, std::string_view text, Faults& faults) {
       break;
     case Kind::kOffset:
       if (!read_number(text, number) || std::abs(number) > 10) return false;
+      break;
+    case Kind::kRelative:
+      if (!read_number(text, number) || std::abs(number) > 0.5) return false;
+      break;
+    case Kind::kPixels:
+      if (!read_number(text, number) || std::abs(number) > 100) return false;
       break;
     case Kind::kInterval: {
       const std::size_t colon = text.find(':');

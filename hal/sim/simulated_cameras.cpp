@@ -35,11 +35,12 @@ Exposure CameraRig::exposure(const ExposedFrame& frame, std::uint64_t seed) cons
 }
 
 SimulatedColorCamera::SimulatedColorCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig,
-                                           const SceneHistory& scenes, bool delivers_corners)
+                                           const SceneHistory& scenes, const CameraIntrinsics& stated,
+                                           bool delivers_corners)
     : clock_(timing, arm),
       rig_(rig),
       scenes_(scenes),
-      intrinsics_(scenes.at(Instant{}).renderer.scene().mount.color),
+      intrinsics_(stated),
       seed_(mix64(timing.seed + kColorNoiseStream)),
       delivers_corners_(delivers_corners) {}
 

@@ -27,8 +27,9 @@ class CameraRig {
 /// poll, next_due and counters from the loop thread, read and read_corners from any.
 class SimulatedColorCamera final : public hal::ColorCamera {
  public:
+  /// @param stated  what it says of itself; pictures are made with the scene's
   SimulatedColorCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig, const SceneHistory& scenes,
-                       bool delivers_corners);
+                       const CameraIntrinsics& stated, bool delivers_corners);
 
   [[nodiscard]] const CameraIntrinsics& intrinsics() const override { return intrinsics_; }
   [[nodiscard]] std::optional<hal::Frame> poll(Instant now) override { return clock_.poll(now); }

@@ -59,12 +59,21 @@ FrameTiming depth_timing(const Faults& faults, std::uint64_t seed) {
   return timing;
 }
 
-CellDescription describe_cell(const Scene& scene, const Renderer& renderer, DepthDetail detail) {
+/// What the colour camera says of itself.
+CameraIntrinsics stated_intrinsics(CameraIntrinsics camera, const Faults& faults) {
+  camera.fx *= 1 + faults.color_focal_error;
+  camera.fy *= 1 + faults.color_focal_error;
+  camera.cx += faults.color_center_error_px;
+  camera.cy += faults.color_center_error_px;
+  return camera;
+}
+
+CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail) {
   CellDescription d;
   d.name = scene.name;
   d.arm_model = scene.arm_model;
   d.start_rad = scene.start_rad;
-  d.color = scene.mount.color;
+  d.color = stated_intrinsics(scene.mount.color, faults);
   d.depth = renderer.depth_intrinsics(detail);
   d.depth_range_min_m = renderer.sensor().range_min_m;
   d.depth_range_max_m = renderer.sensor().range_max_m;
@@ -109,12 +118,12 @@ class Cell final : public SimulatedCell {
       : scenes_(loaded, faults),
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
-        description_(describe_cell(scene_, first_.renderer, detail(options))),
+        description_(describe_cell(scene_, first_.renderer, faults, detail(options))),
         grader_(truth_of(scene_, model, first_, options)),
         watcher_(grader_.monitor(), scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
         rig_(model, scene_.mount, arm_),
-        color_(color_timing(faults, options.seed), arm_, rig_, scenes_, options.fast_sensor),
+        color_(color_timing(faults, options.seed), arm_, rig_, scenes_, description_.color, options.fast_sensor),
         depth_(depth_timing(faults, options.seed), arm_, rig_, scenes_, detail(options)),
         pendant_(pendant_script(faults)),
         panel_(panel_script(faults)) {}

@@ -23,9 +23,10 @@ Expected rejected(const char* code) { return {5, "calibration_rejected", code}; 
 bool begins_with(const Json& text, const std::string& begin) { return text.get<std::string>().starts_with(begin); }
 
 /// Runs the job with these faults; a short exploration is enough to come to its end.
-Json run_with(const std::string& faults, const Expected& expected, const std::vector<std::string>& more = {}) {
+Json run_with(const std::string& faults, const Expected& expected, const std::vector<std::string>& more = {},
+              const std::string& config = {}) {
   const JobFolder folder;
-  folder.write("short.yaml", "explore: {views_max: 2}\n");
+  folder.write("short.yaml", "explore: {views_max: 2}\n" + config);
   std::vector<std::string> words = {"--config", "short.yaml", "--faults", faults};
   words.insert(words.end(), more.begin(), more.end());
   const ProgramResult run = folder.run_job("run", words);
@@ -120,6 +121,17 @@ TEST_CASE("a board that moves rejects the calibration, or the map", "[scenario]"
   CHECK(early["hand_eye"]["verdict"] == "rejected");
   CHECK(early["mapping"].is_null());
   run_with(in_sweep("board.move_at", 10), stopped("E2008"));
+}
+
+TEST_CASE("a camera that states wrong intrinsics is found out, or has them estimated", "[scenario]") {
+  const std::string wrong = "color.focal=0.002,color.center=1";
+  const Json given = run_with(wrong, rejected("E2007"));
+  CHECK(given["hand_eye"]["likely_mistake"]["mistake"] == "intrinsics");
+  CHECK(given["truth"]["hand_eye_mahalanobis2"] > 20.1);
+  const Json estimated = run_with(wrong, kDone, {}, "calibration: {intrinsics: estimate}\n");
+  CHECK(estimated["truth"]["hand_eye_mahalanobis2"] < 20.1);
+  CHECK(estimated["truth"]["hand_eye_error_mm"] < 0.5);
+  CHECK(estimated["hand_eye"]["intrinsics"]["sigma"]["fx_px"] < 0.5);
 }
 
 TEST_CASE("cameras that were never there, or stop, or hang, or have a wrong clock", "[scenario]") {

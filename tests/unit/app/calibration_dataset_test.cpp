@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 // jpeglib.h needs <cstdio> before it.
 #include <jpeglib.h>
@@ -164,9 +165,27 @@ TEST_CASE("without camera_info.yaml the intrinsics come from the views", "[app][
   REQUIRE(data);
   CHECK(data->intrinsics_estimated);
   CHECK(data->camera.fx == Approx(setup.camera.fx).epsilon(0.01));
-  const auto result = calibrate_hand_eye(data->camera, data->board, data->views);
+  HandEyeOptions options;
+  options.refinement.intrinsics = EstimatedIntrinsics::kWithoutK3;
+  const auto result = calibrate_hand_eye(data->camera, data->board, data->views, options);
   REQUIRE(result);
-  CHECK((result->flange_T_camera.translation() - setup.flange_T_camera.translation()).norm() < 5e-3);
+  CHECK((result->flange_T_camera.translation() - setup.flange_T_camera.translation()).norm() < 1e-3);
+  CHECK(result->camera.fx == Approx(setup.camera.fx).epsilon(0.002));
+
+  // The command does the same, and what it writes is the estimated camera.
+  CalibrateCommandOptions command{folder.path.string()};
+  command.out = (folder.path / "out").string();
+  command.intrinsics = "given";
+  CHECK(run_calibrate_command(command) == 2);  // none are
+  command.intrinsics = "";
+  CHECK(run_calibrate_command(command) == 0);
+  const auto written = read_camera_info(folder.path / "out" / "camera_info.yaml");
+  REQUIRE(written);
+  CHECK(written->fx == Approx(result->camera.fx).margin(1e-6));
+  std::ifstream file(folder.path / "out" / "result.json");
+  const auto json = nlohmann::json::parse(file);
+  CHECK(json["hand_eye"]["intrinsics"]["fx_px"].get<double>() == Approx(result->camera.fx).margin(1e-6));
+  CHECK(json["hand_eye"]["intrinsics"]["sigma"]["k3"].is_null());
 }
 
 TEST_CASE("a data set of pose pairs is read and solved", "[app][calibration]") {

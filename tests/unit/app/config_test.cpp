@@ -42,6 +42,7 @@ Config all_changed() {
   c.parking_rad = JointVector{0, -1.5707963267948966, 1e-17, 0.5, -0.25, 3};
   c.board = {"charuco", 7, 5, 0.0251, 0.018, "5x5_100", 3, "yes", "thesis2014"};
   c.calibration = {"tsai-lenz",
+                   "estimate",
                    "fixed48",
                    9,
                    53,

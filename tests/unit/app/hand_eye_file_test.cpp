@@ -258,6 +258,8 @@ TEST_CASE("a calibration belongs to its arm and its cameras", "[hand_eye_file]")
   larger.width = 800;
   CHECK_THAT(why(arm, larger, *c.camera_T_depth), Contains("640x480, the camera gives 800x480"));
   other.cy += 0.5;
+  CHECK(check_belongs(c, arm, other, *c.camera_T_depth, true));  // a cart that estimates them
+  CHECK_FALSE(check_belongs(c, arm, larger, *c.camera_T_depth, true));
   CHECK_THAT(why(arm, other, *c.camera_T_depth), Contains("0.5 px"));
   other = c.intrinsics;
   other.k2 += 0.001;

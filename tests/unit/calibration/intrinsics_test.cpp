@@ -35,3 +35,13 @@ TEST_CASE("views that cannot tell the intrinsics are refused", "[calibration]") 
                                         CalibrationView{{}, std::vector<Eigen::Vector2d>(48, Eigen::Vector2d(1, 1))});
   CHECK_FALSE(estimate_intrinsics(640, 480, setup.board, nonsense));
 }
+
+TEST_CASE("views that look straight at the board do not tell the focal length, and it is said", "[calibration]") {
+  Setup setup;
+  setup.tilt_max_rad = 0.1 * test::kDegree;
+  Random random(53);
+  const auto estimate = estimate_intrinsics(640, 480, setup.board, test::observe_views(setup, 12, random));
+  REQUIRE_FALSE(estimate);
+  CHECK(estimate.error().fault == Fault::kIntrinsicsUnknown);
+  CHECK_THAT(std::string(estimate.error().detail()), Catch::Matchers::Contains("f"));
+}

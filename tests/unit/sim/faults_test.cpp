@@ -17,6 +17,10 @@ TEST_CASE("a fault specification is read", "[sim][faults]") {
   CHECK(faults->board_absent);
   CHECK(faults->link_lost_s == 40);
   CHECK(faults->depth_clock_offset_s == -0.1);
+  const auto camera = parse_faults("color.focal=-0.002,color.center=1.5");
+  REQUIRE(camera.has_value());
+  CHECK(camera->color_focal_error == -0.002);
+  CHECK(camera->color_center_error_px == 1.5);
   CHECK(faults->play_s == 0.5);
   CHECK(faults->stop_s == kNever);
 }
@@ -36,9 +40,9 @@ TEST_CASE("an unknown fault names the nearest known one", "[sim][faults]") {
 }
 
 TEST_CASE("values out of range are refused", "[sim][faults]") {
-  for (const char* bad :
-       {"depth.drop=1.5", "depth.drop", "depth.drop=", "link.lost_at=-1", "link.lost_at=soon", "board.absent=yes",
-        "operator.pause_at=5:0", "depth.clock=nan", "depth.drop=0.1x", ",", "=1"}) {
+  for (const char* bad : {"depth.drop=1.5", "depth.drop", "depth.drop=", "link.lost_at=-1", "link.lost_at=soon",
+                          "board.absent=yes", "operator.pause_at=5:0", "depth.clock=nan", "color.focal=2",
+                          "color.center=500", "depth.drop=0.1x", ",", "=1"}) {
     INFO(bad);
     CHECK_FALSE(parse_faults(bad).has_value());
   }

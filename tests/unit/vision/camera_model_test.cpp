@@ -35,6 +35,27 @@ TEST_CASE("distortion as Brown's formula gives it", "[vision]") {
   CHECK(d.y() == Approx(-.2 * radial + -.00268 * (.13 + 2 * .04) + 2 * .00209 * .3 * -.2));
 }
 
+TEST_CASE("derivatives by the intrinsics agree with differences", "[vision]") {
+  Random random(4);
+  const CameraIntrinsics camera{640, 480, 537.33, 538.35, 321.61, 252.18, .17938, -.31818, -.00268, .00209, .05};
+  const auto pixel = [](const CameraIntrinsics& c, const Eigen::Vector2d& p) {
+    return project(c, Eigen::Vector3d(p.x(), p.y(), 1)).value();
+  };
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector2d normalized(random.uniform(-.5, .5), random.uniform(-.4, .4));
+    const IntrinsicsJacobian j = intrinsics_jacobian(camera, normalized);
+    for (int number = 0; number < 9; ++number) {
+      const double step = number < 4 ? 1e-3 : 1e-6;
+      const IntrinsicsVector change = step * IntrinsicsVector::Unit(number);
+      const CameraIntrinsics up = with_intrinsics(camera, intrinsics_vector(camera) + change);
+      const CameraIntrinsics down = with_intrinsics(camera, intrinsics_vector(camera) - change);
+      const Eigen::Vector2d slope = (pixel(up, normalized) - pixel(down, normalized)) / (2 * step);
+      CHECK((slope - j.col(number)).norm() < 1e-5);
+    }
+  }
+  CHECK(with_intrinsics(camera, intrinsics_vector(camera)) == camera);
+}
+
 TEST_CASE("derivatives agree with differences", "[vision]") {
   Random random(3);
   constexpr double kStep = 1e-6;
