@@ -70,7 +70,11 @@ struct Config {
   struct Calibration {
     std::string solver = "park-martin";  ///< what starts the joint refinement
     std::string intrinsics = "given";    ///< given | estimate: together with everything else
-    std::string views = "designed";      ///< designed | fixed48: algorithms/view_planning/fixed_views.hpp
+    std::string depth = "estimate";      ///< given | estimate: where the depth camera sits on the colour camera
+    double depth_sigma_mm = 3;           ///< of where it is said to be, each axis
+    double depth_sigma_mrad = 5;
+    std::string time_offset = "estimate";  ///< given | estimate: between the cameras' stamps and the arm's
+    std::string views = "designed";        ///< designed | fixed48: algorithms/view_planning/fixed_views.hpp
     int views_min = 8;
     int views_max = 30;
     int holdout_views = 4;

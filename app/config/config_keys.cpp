@@ -120,6 +120,19 @@ void add_calibration_keys(Keys& keys, Config& c) {
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
   keys.push_back({"calibration.intrinsics", &k.intrinsics, 0, 0, kIntrinsics,
                   "of the colour camera. given: as the camera states them; estimate: solved for with the rest"});
+  keys.push_back({"calibration.depth", &k.depth, 0, 0, kIntrinsics,
+                  "where the depth camera sits on the colour camera. given: as stated, taken as exact; estimate: found "
+                  "from the board's plane in depth images of the calibration views"});
+  keys.push_back({"calibration.depth_sigma_mm",
+                  &k.depth_sigma_mm,
+                  0.01,
+                  20,
+                  {},
+                  "standard deviation of where it is stated to be, each axis; counts where the board tells nothing"});
+  keys.push_back({"calibration.depth_sigma_mrad", &k.depth_sigma_mrad, 0.01, 50, {}, "the same of its rotation"});
+  keys.push_back({"calibration.time_offset", &k.time_offset, 0, 0, kIntrinsics,
+                  "of the cameras' stamps. given: they are the arm's time; estimate: found from frames on the way "
+                  "between calibration views, up to 0.2 s"});
   keys.push_back(
       {"calibration.views", &k.views, 0, 0, kCalibrationViews,
        "designed: each for what it adds; fixed48: a list that moves the board over the picture, to compare"});

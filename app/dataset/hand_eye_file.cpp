@@ -36,16 +36,18 @@ struct Complaint {
   throw Complaint{node.Mark().is_null() ? 0 : node.Mark().line + 1, std::move(text)};
 }
 
-/// A map of which every key must be known, and be there, once.
+/// A map of which every key must be known, and be there, once. Those in `optional` may be missing.
 class Section {
  public:
-  Section(const YAML::Node& node, std::string_view name, std::span<const std::string_view> keys)
+  Section(const YAML::Node& node, std::string_view name, std::span<const std::string_view> keys,
+          std::span<const std::string_view> optional = {})
       : node_(node), name_(name) {
     if (!node.IsMap()) complain(node, name_.empty() ? "not a list of keys and values" : name_ + " must have keys");
     std::set<std::string> seen;
     for (const auto& pair : node) {
       const std::string key = pair.first.IsScalar() ? pair.first.Scalar() : std::string();
-      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      if (std::find(keys.begin(), keys.end(), key) == keys.end() &&
+          std::find(optional.begin(), optional.end(), key) == optional.end()) {
         complain(pair.first, fmt::format("unknown key '{:.40}'; did you mean {}?", key, nearest_name(key, keys)));
       }
       if (!seen.insert(key).second) complain(pair.first, fmt::format("{} is given twice", key));
@@ -130,24 +132,33 @@ constexpr std::array<std::string_view, 22> kKeys = {
     "holdout_rms_px",
     "usable_distance_m",
 };
+/// Of calibrations that estimated them.
+constexpr std::array<std::string_view, 3> kOptionalKeys = {"depth_camera", "color_stamps", "depth_stamps"};
+constexpr std::array<std::string_view, 6> kDepthCameraKeys = {"sigma_translation_mm", "sigma_rotation_mrad",
+                                                              "depth_scale",          "sigma_depth_scale",
+                                                              "stated_translation_m", "stated_quaternion_xyzw"};
+constexpr std::array<std::string_view, 2> kStampKeys = {"offset_s", "sigma_s"};
 constexpr std::array<std::string_view, 11> kIntrinsicsKeys = {
     "image_width", "image_height", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
 constexpr std::array<std::string_view, 2> kTransformKeys = {"translation_m", "quaternion_xyzw"};
 
+/// @param prefix of the two keys
 template <typename A, typename B>
-Transform<A, B> read_transform(const Section& section) {
-  for (const double value : section.numbers<3>("translation_m", -1e9, 1e9)) {
+Transform<A, B> read_transform(const Section& section, std::string_view prefix = {}) {
+  const std::string translation = fmt::format("{}translation_m", prefix);
+  const std::string quaternion = fmt::format("{}quaternion_xyzw", prefix);
+  for (const double value : section.numbers<3>(translation, -1e9, 1e9)) {
     if (std::abs(value) > kTranslationMax_m) {
-      complain(section.child("translation_m"),
-               fmt::format("translation_m holds {} m: metres are wanted, that looks like millimetres", value));
+      complain(section.child(translation),
+               fmt::format("{} holds {} m: metres are wanted, that looks like millimetres", translation, value));
     }
   }
-  const auto t = section.numbers<3>("translation_m", -kTranslationMax_m, kTranslationMax_m);
-  const auto q = section.numbers<4>("quaternion_xyzw", -1e9, 1e9);
+  const auto t = section.numbers<3>(translation, -kTranslationMax_m, kTranslationMax_m);
+  const auto q = section.numbers<4>(quaternion, -1e9, 1e9);
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   if (std::abs(rotation.norm() - 1) > 1e-6) {
-    complain(section.child("quaternion_xyzw"),
-             fmt::format("quaternion_xyzw has the norm {:.7g} instead of 1: copy all digits", rotation.norm()));
+    complain(section.child(quaternion),
+             fmt::format("{} has the norm {:.7g} instead of 1: copy all digits", quaternion, rotation.norm()));
   }
   return {rotation, Eigen::Vector3d(t[0], t[1], t[2])};
 }
@@ -232,8 +243,29 @@ void require_word(const Section& section, std::string_view key, std::string_view
   }
 }
 
+void read_depth_mount(const YAML::Node& node, StoredCalibration& c) {
+  const Section s(node, "depth_camera", kDepthCameraKeys);
+  if (!c.camera_T_depth) complain(node, "depth_camera says how sure camera_T_depth is, which is null");
+  c.stated_camera_T_depth = read_transform<Camera, Depth>(s, "stated_");
+  DepthMount mount;
+  mount.camera_T_depth = *c.camera_T_depth;
+  mount.depth_scale = s.number("depth_scale", 0.5, 2);
+  const auto mm = s.numbers<3>("sigma_translation_mm", 0, 1000 * kSigmaMax_m);
+  const auto mrad = s.numbers<3>("sigma_rotation_mrad", 0, 1000 * kSigmaMax_rad);
+  Vector7d sigma;
+  sigma << mm[0], mm[1], mm[2], mrad[0], mrad[1], mrad[2], 1e3 * s.number("sigma_depth_scale", 0, 1);
+  mount.covariance.diagonal() = (1e-3 * sigma).cwiseAbs2();
+  c.depth_mount = mount;
+}
+
+std::optional<StoredOffset> read_stamps(const YAML::Node& node, std::string_view name) {
+  if (!node) return std::nullopt;
+  const Section s(node, name, kStampKeys);
+  return StoredOffset{s.number("offset_s", -1, 1), s.number("sigma_s", 0, 1)};
+}
+
 StoredCalibration parse(const YAML::Node& root) {
-  const Section s(root, "", kKeys);
+  const Section s(root, "", kKeys, kOptionalKeys);
   if (const int format = s.whole("format", 0, 1000); format != kFormat) {
     complain(s.child("format"), fmt::format("format {} is not known, only {}", format, kFormat));
   }
@@ -260,6 +292,9 @@ StoredCalibration parse(const YAML::Node& root) {
   if (const YAML::Node depth = s.child("camera_T_depth"); !depth.IsNull()) {
     c.camera_T_depth = read_transform<Camera, Depth>(Section(depth, "camera_T_depth", kTransformKeys));
   }
+  if (const YAML::Node mount = s.child("depth_camera")) read_depth_mount(mount, c);
+  c.color_offset = read_stamps(s.child("color_stamps"), "color_stamps");
+  c.depth_offset = read_stamps(s.child("depth_stamps"), "depth_stamps");
   c.solver = s.text("solver");
   if (!find_solver(c.solver)) complain(s.child("solver"), fmt::format("solver '{:.40}' is not known", c.solver));
   c.views = s.whole("views", 3, 100000);
@@ -296,6 +331,30 @@ std::string depth_text(const std::optional<Transform<Camera, Depth>>& camera_T_d
   if (!camera_T_depth) return "camera_T_depth: null\n";
   return fmt::format("camera_T_depth:\n  translation_m: {}\n  quaternion_xyzw: {}\n",
                      list(camera_T_depth->translation()), list(quaternion_xyzw(camera_T_depth->quaternion())));
+}
+
+std::string alignment_text(const StoredCalibration& c) {
+  std::string text;
+  if (c.depth_mount && c.stated_camera_T_depth) {
+    const Vector7d sigma = 1e3 * c.depth_mount->covariance.diagonal().cwiseMax(0).cwiseSqrt();
+    text += fmt::format(
+        "# camera_T_depth was estimated: how sure it is along and about the camera's axes, how much too long depths "
+        "are\n"
+        "# (1: not), and what its maker states.\n"
+        "depth_camera:\n  sigma_translation_mm: {}\n  sigma_rotation_mrad: {}\n  depth_scale: {}\n"
+        "  sigma_depth_scale: {}\n  stated_translation_m: {}\n  stated_quaternion_xyzw: {}\n",
+        list(Eigen::Vector3d(sigma.head<3>())), list(Eigen::Vector3d(sigma.segment<3>(3))),
+        yaml_number(c.depth_mount->depth_scale), yaml_number(1e-3 * sigma[6]),
+        list(c.stated_camera_T_depth->translation()), list(quaternion_xyzw(c.stated_camera_T_depth->quaternion())));
+  }
+  const auto stamps = [&](std::string_view name, const std::optional<StoredOffset>& offset) {
+    if (!offset) return;
+    text += fmt::format("{}: {{offset_s: {}, sigma_s: {}}} # add to the camera's stamps to have the arm's time\n", name,
+                        yaml_number(offset->offset_s), yaml_number(offset->sigma_s));
+  };
+  stamps("color_stamps", c.color_offset);
+  stamps("depth_stamps", c.depth_offset);
+  return text;
 }
 
 std::string covariance_text(const Matrix6d& covariance) {
@@ -352,7 +411,7 @@ std::string hand_eye_yaml(const StoredCalibration& c) {
       "arm_sigma_mrad: {}\n",
       list(Eigen::Vector3d(sigmas.head<3>())), list(Eigen::Vector3d(sigmas.tail<3>())), covariance_text(c.covariance),
       n(c.corner_sigma_px), n(c.arm_sigma.translation_m * 1e3), n(c.arm_sigma.rotation_rad * 1e3));
-  text += intrinsics_text(c.intrinsics) + depth_text(c.camera_T_depth);
+  text += intrinsics_text(c.intrinsics) + depth_text(c.camera_T_depth) + alignment_text(c);
   return text + fmt::format(
                     "solver: {}\n"
                     "views: {}\n"
@@ -420,7 +479,8 @@ Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, 
                    px, distortion);
   }
   if (!calibration.camera_T_depth) return {};  // solved without one: nothing in it depends on where that sits
-  const Vector6d depth = pose_difference(camera_T_depth.pose(), calibration.camera_T_depth->pose());
+  const Transform<Camera, Depth>& stated = calibration.stated_camera_T_depth.value_or(*calibration.camera_T_depth);
+  const Vector6d depth = pose_difference(camera_T_depth.pose(), stated.pose());
   if (!(depth.head<3>().norm() <= kSame_m) || !(depth.tail<3>().norm() <= kSame_rad)) {
     return failure(Fault::kStoredCalibration, "the depth camera sits {:.2f} mm and {:.2f} mrad elsewhere than then",
                    depth.head<3>().norm() * 1e3, depth.tail<3>().norm() * 1e3);

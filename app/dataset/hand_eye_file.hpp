@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "algorithms/calibration/calibration_view.hpp"
+#include "algorithms/calibration/depth_to_color.hpp"
 #include "algorithms/calibration/hand_eye_refinement.hpp"
 #include "algorithms/kinematics/arm_model.hpp"
 #include "platform/core/camera_intrinsics.hpp"
@@ -18,6 +19,12 @@ namespace firstlook {
 
 /// The arm of a calibration from recorded data that nobody named; no job takes that one up.
 inline constexpr std::string_view kUnknownArm = "unknown";
+
+/// What a camera's stamps need to be the arm's time.
+struct StoredOffset {
+  double offset_s = 0;
+  double sigma_s = 0;
+};
 
 /// Everything that hand_eye.yaml says: the transform, how sure it is, and what it holds for.
 struct StoredCalibration {
@@ -30,6 +37,10 @@ struct StoredCalibration {
   ArmSigma arm_sigma;
   CameraIntrinsics intrinsics;  ///< of the colour camera; width 0: solved from pose pairs, none known
   std::optional<Transform<Camera, Depth>> camera_T_depth;  ///< as used with it; empty: no depth camera took part
+  /// When the depth camera's pose was estimated: that pose with its covariance, and what was stated of it then.
+  std::optional<DepthMount> depth_mount;
+  std::optional<Transform<Camera, Depth>> stated_camera_T_depth;
+  std::optional<StoredOffset> color_offset, depth_offset;  ///< when they were estimated
   std::string solver;
   int views = 0;        ///< used in the solve
   int views_given = 0;  ///< with those left out as wrong
@@ -51,7 +62,8 @@ struct StoredCalibration {
 [[nodiscard]] Result<StoredCalibration> read_hand_eye(const std::filesystem::path& file);
 
 /// Whether a calibration was made with this arm, colour camera and depth camera. Where a cart estimates its intrinsics,
-/// those of the calibration count and only the size of the pictures is compared.
+/// those of the calibration count and only the size of the pictures is compared. Of a depth camera whose pose was
+/// estimated, what is stated of it is compared.
 /// @return kStoredCalibration with what differs
 [[nodiscard]] Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm,
                                    const CameraIntrinsics& intrinsics, const Transform<Camera, Depth>& camera_T_depth,

@@ -128,6 +128,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     o.pose = *pose;
     o.residual_rms_px = pose->residual_rms_px;
     o.settling = {static_cast<int>(arguments.looks), sight.moved_px, sight.picture->scatter_px, sight.still};
+    o.plane = plane_beside(arguments, *pose);
     keep_picture(observations_.size());
     observations_.push_back(std::move(o));
     settle_observations(arguments.purpose);

@@ -180,6 +180,13 @@ SolveResult Workbench::solve() {
   result.sigma_mm = 1000 * solved->sigma_translation_m.norm();
   result.sigma_mrad = 1000 * solved->sigma_rotation_rad.norm();
   result.reprojection_rms_px = solved->reprojection_rms_px;
+  align_sensors();
+  if (const auto& depth = alignment_.depth_camera.estimate) {
+    result.depth_estimated = true;
+    result.depth_moved_mm = 1000 * depth->moved.head<3>().norm();
+    result.depth_moved_mrad = 1000 * depth->moved.tail<3>().norm();
+  }
+  result.offsets = stamp_offsets();
   return result;
 }
 

@@ -49,6 +49,8 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
     case JobKind::kDetectBoard:
       return run<DetectArguments>(request, result, failed_,
                                   [&b](const DetectArguments& a) { return b.detect_board(a); });
+    case JobKind::kSeeOnTheWay:
+      return run<WayArguments>(request, result, failed_, [&b](const WayArguments& a) { return b.see_on_the_way(a); });
     case JobKind::kNextCalibrationView:
       return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.next_calibration_view(a); });
     case JobKind::kSolve:
@@ -92,6 +94,7 @@ Duration virtual_duration(JobKind kind) {
       return milliseconds(5);
     case JobKind::kDetectBoard:
     case JobKind::kCheckBoard:
+    case JobKind::kSeeOnTheWay:
       return milliseconds(150);
     case JobKind::kNextCalibrationView:
     case JobKind::kNextVerificationView:

@@ -14,13 +14,14 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   const ImageView<std::uint16_t> pixels{depth_pixels_.items().data(), camera.width, camera.height};
   const double stamp_s = arguments.frame.frame.stamp.seconds();
   const LinkFrames frames = forward(arm_, arguments.frame.at_rad);
-  const auto base_T_depth = frames.flange() * hand_eye_->flange_T_camera * facts_.camera_T_depth;
+  const auto base_T_depth = frames.flange() * hand_eye_->flange_T_camera * camera_T_depth();
 
   if (depth_.read(arguments.frame.frame, pixels) && !is_frozen(arguments.frame.frame, result)) {
     const Capsules body = place(camera_body_.capsules, frames);
     render_self_depth(std::span<const Capsule>(body.data(), body.size()), kSelfPadding_m, base_T_depth, camera,
                       self_depth_.items());
-    const DepthImage depth{{pixels.data, pixels.width, pixels.height}, depth_.units_per_m()};
+    const double units_per_m = depth_.units_per_m() * alignment_.depth_camera.mount.depth_scale;
+    const DepthImage depth{{pixels.data, pixels.width, pixels.height}, units_per_m};
     if (inserter_.insert(map_, depth, base_T_depth, self_depth_.items(), stamp_s)) {
       result.used = true;
       ++frames_integrated_;

@@ -149,6 +149,7 @@ VerifyResult Workbench::verify_calibration() {
   if (result.accepted) {
     begin_mapping();
     result.clearance_m = mapping_terms_->voxels_m;
+    result.offsets = stamp_offsets();
   }
   return result;
 }

@@ -10,6 +10,7 @@ namespace {
 constexpr double kFieldMax_m = 0.6;     // farther is as good as free: the largest body radius and clearance are below
 constexpr double kZoneMargin_m = 0.10;  // stopping distance and a voxel, as the reach zone wants
 constexpr std::size_t kViewRecordsMax = 512;
+constexpr std::size_t kWaySightsMax = 60;  // as many as the machine takes
 // Known free space that expires within this share of its greatest age wants a look: a few views renew all of it, and a
 // job that lasts longer does not find its way back closed.
 constexpr double kFreshShareOfAge = 1.0 / 3;
@@ -91,6 +92,8 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
   for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});
   mapping_views_.reserve(kViewRecordsMax);
   observations_.reserve(static_cast<std::size_t>(config.calibration.views_max) + 1);
+  way_sights_.reserve(kWaySightsMax);
+  begin_alignment();
   publish_blind(0);
   published_.take();
 }
@@ -108,6 +111,8 @@ Status Workbench::take_memory() {
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
   const std::size_t point = sizeof(Eigen::Vector2d) + (board_.allows_partial_views() ? sizeof(int) : 0);
   const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * point;
+  const std::size_t way_sight = sizeof(WaySight) + decltype(WayArguments::joints)::capacity() * sizeof(JointSample) +
+                                static_cast<std::size_t>(board_.corners()) * point;
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,
@@ -116,7 +121,7 @@ Status Workbench::take_memory() {
            std::pair{memory::Pool::kViewCandidates, ViewChooser::required_bytes(g, config_.explore.candidates, 2,
                                                                                 config_.explore.certificate_samples)},
            std::pair{memory::Pool::kPlannerNodes, 2 * Planner::required_bytes()},  // ours and the chooser's
-           std::pair{memory::Pool::kCalibrationViews, views * view},
+           std::pair{memory::Pool::kCalibrationViews, views * view + kWaySightsMax * way_sight},
            std::pair{memory::Pool::kApplication, sizeof(Workbench) + kViewRecordsMax * sizeof(MappingViewRecord)},
        }) {
     if (const Status status = account(pool, bytes); !status) return status;
@@ -174,6 +179,11 @@ void Workbench::begin_mapping() {
   ClearanceInputs in = clearance_inputs(config_);
   in.sigma_hand_eye_m = hand_eye_->sigma_translation_m.maxCoeff();
   in.sigma_hand_eye_rad = hand_eye_->sigma_rotation_rad.maxCoeff();
+  const Vector7d depth_camera = alignment_.depth_camera.mount.covariance.diagonal().cwiseSqrt();
+  in.sigma_depth_camera_m = depth_camera.head<3>().maxCoeff();
+  in.sigma_depth_camera_rad = depth_camera.segment<3>(3).maxCoeff();
+  in.sigma_depth_scale = depth_camera[6];
+  in.sigma_tracking_m = std::hypot(in.sigma_tracking_m, in.speed_m_s * alignment_.depth_stamps.sigma_s);
   mapping_terms_ = required_clearance(in);
   in.speed_m_s = std::min(kSlowSpeed_m_s, in.speed_m_s);
   slow_terms_ = required_clearance(in);
@@ -252,7 +262,7 @@ ViewContext Workbench::context(const Clearance& clearance) const {
           clearance,
           map_,
           zone_,
-          hand_eye_->flange_T_camera * facts_.camera_T_depth,
+          hand_eye_->flange_T_camera * camera_T_depth(),
           last_stamp_s_ + kFreshShareOfAge * max_age_s,
           max_age_s};
 }

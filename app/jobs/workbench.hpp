@@ -37,7 +37,7 @@ namespace firstlook {
 /// What the program knows of its cell besides the configuration: the integrator's data sheet.
 struct CellFacts {
   JointVector start_rad;                    ///< where the sweep turns around, and where the job parks
-  Transform<Camera, Depth> camera_T_depth;  ///< factory transform
+  Transform<Camera, Depth> camera_T_depth;  ///< as its maker states it
   std::optional<StoredCalibration> stored;  ///< of an earlier job; for scopes that verify it
 };
 
@@ -49,6 +49,17 @@ struct Observation {
   BoardPose pose;
   double residual_rms_px = 0;
   SettlingRecord settling;
+  std::optional<BoardPlane> plane;  ///< of the board in depth frames of this stop
+};
+
+/// What was seen of the board on the way between two stops.
+struct WaySight {
+  std::vector<JointSample> joints;
+  double color_stamp_s = 0;  ///< as the camera has it
+  CornerSet corners;
+  double depth_stamp_s = 0;
+  std::optional<BoardPlane> plane;
+  int motion = 0;
 };
 
 /// What the frames of one look show.
@@ -74,6 +85,7 @@ class Workbench {
   [[nodiscard]] PlanResult plan(const PlanArguments& arguments);
   [[nodiscard]] PlanResult certify_path(const PlanArguments& arguments);
   [[nodiscard]] DetectResult detect_board(const DetectArguments& arguments);
+  [[nodiscard]] WayResult see_on_the_way(const WayArguments& arguments);
   [[nodiscard]] CalibrationViewResult next_calibration_view(const FromHere& here);
   [[nodiscard]] SolveResult solve();
   [[nodiscard]] ValidateResult validate();
@@ -89,6 +101,8 @@ class Workbench {
   /// The colour camera as everything that follows takes it: as it states, or as a calibration estimated it.
   [[nodiscard]] const CameraIntrinsics& camera() const;
   [[nodiscard]] const std::optional<HandEyeResult>& hand_eye() const { return hand_eye_; }
+  /// How depth camera, colour camera and arm stand to each other in space and time.
+  [[nodiscard]] const AlignmentRecord& alignment() const { return alignment_; }
   [[nodiscard]] const std::optional<ClearanceTerms>& clearance_terms() const { return mapping_terms_; }
   [[nodiscard]] std::vector<CalibrationViewRecord> calibration_records() const;
   /// With the row "end" when frames went into the map after the last look.
@@ -139,6 +153,20 @@ class Workbench {
   [[nodiscard]] NextViewResult sweep_at(const Pace& pace, const FromHere& here);
   [[nodiscard]] NextViewResult explore_at(const Pace& pace, const FromHere& here);
 
+  void begin_alignment();
+  void align_sensors();
+  void align_depth_camera();
+  void align_stamps();
+  [[nodiscard]] DepthMount stated_mount() const;
+  [[nodiscard]] const Transform<Camera, Depth>& camera_T_depth() const {
+    return alignment_.depth_camera.mount.camera_T_depth;
+  }
+  [[nodiscard]] StampOffsets stamp_offsets() const {
+    return {alignment_.color_stamps.offset_s, alignment_.depth_stamps.offset_s};
+  }
+  [[nodiscard]] Result<BoardPlane> plane_of(const hal::Frame& frame, const Transform<Camera, Board>& camera_T_board);
+  [[nodiscard]] std::optional<BoardPlane> plane_beside(const DetectArguments& arguments, const BoardPose& pose);
+  [[nodiscard]] std::optional<SeenPose> seen_pose(const WaySight& sight) const;
   [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
   [[nodiscard]] BoardSight sight_of(const DetectArguments& arguments);
   void keep_picture(std::size_t observation);
@@ -192,6 +220,8 @@ class Workbench {
 
   std::optional<BoardPose> identify_reference_;
   std::vector<Observation> observations_;
+  std::vector<WaySight> way_sights_;
+  AlignmentRecord alignment_;
   Turns bootstrap_;
   std::size_t bootstrap_next_ = 0;
   int fixed_next_ = 0;                 ///< of next_fixed_view

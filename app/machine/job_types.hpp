@@ -30,8 +30,9 @@ enum class JobKind : std::uint16_t {
   kForgetKnownFree,
   kNextVerificationView,
   kVerifyCalibration,
+  kSeeOnTheWay,
 };
-inline constexpr JobKind kLastJobKind = JobKind::kVerifyCalibration;
+inline constexpr JobKind kLastJobKind = JobKind::kSeeOnTheWay;
 
 /// What people read: "choosing the next view".
 [[nodiscard]] constexpr std::string_view name_of(JobKind kind) {
@@ -51,7 +52,8 @@ inline constexpr JobKind kLastJobKind = JobKind::kVerifyCalibration;
       "summing up what remains unknown",
       "forgetting what was known free",
       "choosing the next view to test the calibration from",
-      "testing the stored calibration"};
+      "testing the stored calibration",
+      "looking at the board on the way"};
   return kNames[static_cast<std::size_t>(kind) - 1];
 }
 
@@ -140,6 +142,19 @@ struct PosedFrame {
 
 enum class BoardLook : std::uint8_t { kLocate, kIdentify, kCollect, kConclude, kVerify };
 
+/// Depth frames of a calibration view: two average their noise, more would not be faster than the colour frames.
+inline constexpr std::size_t kDepthBesideMax = 2;
+
+/// What is added to the stamps of each camera's frames to have the arm's time; 0 where it is taken as right.
+struct StampOffsets {
+  double color_s = 0;
+  double depth_s = 0;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(color_s, depth_s);
+  }
+};
+
 /// Looks from one stop whose picture moved are taken again, up to so many: 2 s with three frames of 30 Hz.
 inline constexpr std::uint32_t kLooksMax = 16;
 
@@ -149,10 +164,43 @@ struct DetectArguments {
   BoardLook purpose = BoardLook::kLocate;
   std::uint32_t view = 0;
   FixedVector<PosedFrame, 8> frames;
-  std::uint32_t looks = 1;  ///< from this stop, this one included
+  std::uint32_t looks = 1;                                  ///< from this stop, this one included
+  FixedVector<PosedFrame, kDepthBesideMax> depth_frames{};  ///< taken beside them; only for kCollect
   template <typename Archive>
   void fields(Archive& a) {
-    a(purpose, view, frames, looks);
+    a(purpose, view, frames, looks, depth_frames);
+  }
+};
+
+/// Where the arm's joints were at a time.
+struct JointsAtTime {
+  Instant stamp{};
+  JointVector at_rad;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(stamp, at_rad);
+  }
+};
+
+/// kSeeOnTheWay: frames taken while the arm moved between two calibration views, with their stamps as the cameras have
+/// them, and the joints from before them to after them.
+struct WayArguments {
+  hal::Frame color, depth;
+  bool has_depth = false;
+  std::uint32_t motion = 0;  ///< counts the motions
+  FixedVector<JointsAtTime, 40> joints;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(color.stamp, color.sequence, color.slot, depth.stamp, depth.sequence, depth.slot, has_depth, motion, joints);
+  }
+};
+
+struct WayResult {
+  bool seen = false;   ///< the board in the colour frame
+  bool plane = false;  ///< its plane in the depth frame
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(seen, plane);
   }
 };
 
@@ -190,9 +238,14 @@ struct SolveResult {
   double sigma_mm = 0;
   double sigma_mrad = 0;
   double reprojection_rms_px = 0;
+  bool depth_estimated = false;  ///< the depth camera's pose on the colour camera
+  double depth_moved_mm = 0;     ///< from where it was said to be
+  double depth_moved_mrad = 0;
+  StampOffsets offsets;
   template <typename Archive>
   void fields(Archive& a) {
-    a(solved, fault, translation_m, quaternion_xyzw, sigma_mm, sigma_mrad, reprojection_rms_px);
+    a(solved, fault, translation_m, quaternion_xyzw, sigma_mm, sigma_mrad, reprojection_rms_px, depth_estimated,
+      depth_moved_mm, depth_moved_mrad, offsets);
   }
 };
 
@@ -225,9 +278,10 @@ struct VerifyResult {
   double chi2_limit = 0;
   double residual_rms_px = 0;
   double clearance_m = 0;  ///< of safety rule 5, with this calibration
+  StampOffsets offsets;    ///< as stored with it
   template <typename Archive>
   void fields(Archive& a) {
-    a(accepted, chi2, chi2_limit, residual_rms_px, clearance_m);
+    a(accepted, chi2, chi2_limit, residual_rms_px, clearance_m, offsets);
   }
 };
 

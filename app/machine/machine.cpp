@@ -11,6 +11,19 @@ constexpr double kArmStale_s = 0.1;               // 12 reports at 125 Hz
 constexpr double kDepthStale_s = 0.5;             // 15 frames at 30 Hz
 constexpr double kSegmentAcceptedWithin_s = 0.2;  // else the leg counts as interrupted
 constexpr std::uint32_t kInterruptionsMax = 25;   // of one job; more means that the cell does not stand still
+// Frames on the way: joints are kept from so much before to so much after them, the largest offset of stamps that is
+// looked for (0.2 s) and two of the arm's reports.
+constexpr Duration kJointsAround = milliseconds(216);
+constexpr Duration kJointsApart = milliseconds(15);  // every second report at 125 Hz
+constexpr Duration kWayFramesApart = milliseconds(250);
+constexpr std::uint32_t kWayFramesOfMotion = 5;
+constexpr std::uint32_t kWayFramesMax = 60;  // an offset known to 0.2 ms; each costs as much as a look
+
+template <typename Frames>
+void drop_first(Frames& frames) {
+  for (std::size_t i = 1; i < frames.size(); ++i) frames[i - 1] = frames[i];
+  frames.pop_back();
+}
 }  // namespace
 
 Machine::Machine(const MachineSettings& settings, DecisionSink& sink) : settings_(settings), sink_(sink) {}
@@ -27,16 +40,29 @@ void Machine::on_event(Instant now, const MachineEvent& event) {
   if (const auto* report = std::get_if<ArmReported>(&event)) remember_arm(*report);
   if (const auto* frame = std::get_if<ColorFrameArrived>(&event)) {
     color_seen_ = true;
-    pending_color_ = frame->frame;
+    if (pending_color_.full()) drop_first(pending_color_);
+    pending_color_.push_back(frame->frame);
+    pending_color_.back().stamp = frame->frame.stamp + color_offset_;
   }
   if (const auto* frame = std::get_if<DepthFrameArrived>(&event)) {
     depth_seen_ = true;
     last_depth_ = now;
-    pending_depth_ = frame->frame;
+    if (pending_depth_.full()) drop_first(pending_depth_);
+    pending_depth_.push_back(frame->frame);
+    pending_depth_.back().stamp = frame->frame.stamp + depth_offset_;
   }
+  // What was seen on the way is of use, but nobody waits for it: without it the stamps stay as they are.
+  if (const auto* done = std::get_if<JobCompleted>(&event); done != nullptr && done->number == way_job_) {
+    way_job_ = 0;
+    return;
+  }
+  note_way_frame(event);
   if (supervise(event)) return;
   dispatch(event);
-  if (std::holds_alternative<ArmReported>(event)) pose_pending_frames();
+  if (std::holds_alternative<ArmReported>(event)) {
+    pose_pending_frames();
+    see_way_frames();
+  }
 }
 
 bool Machine::supervise(const MachineEvent& event) {
@@ -101,6 +127,7 @@ void Machine::enter_path_to(StateId target) {
   }
   awaited_ = 0;
   looking_ = false;
+  way_color_.reset();
   if (travelling_) withdraw_trip();
   FixedVector<StateId, 8> chain;
   for (StateId at = target; at != StateId::kNone && at != state_; at = state_row(at).parent) chain.push_back(at);
@@ -158,28 +185,79 @@ std::optional<JointVector> Machine::joints_at(Instant stamp) const {
   return std::nullopt;
 }
 
+/// The oldest of the frames whose stamps the arm has reached, when its joints there are known.
+template <typename Frames>
+std::optional<PosedFrame> Machine::next_posed(Frames& pending) {
+  while (!pending.empty() && pending.front().stamp <= arm_.stamp) {
+    const hal::Frame frame = pending.front();
+    drop_first(pending);
+    if (const auto joints = joints_at(frame.stamp)) return PosedFrame{frame, *joints};
+  }
+  return std::nullopt;
+}
+
 void Machine::pose_pending_frames() {
-  if (pending_color_ && pending_color_->stamp <= arm_.stamp) {
-    const auto joints = joints_at(pending_color_->stamp);
-    const hal::Frame frame = *pending_color_;
-    pending_color_.reset();
-    if (joints) dispatch(ColorPosed{{frame, *joints}});
+  while (const auto posed = next_posed(pending_color_)) dispatch(ColorPosed{*posed});
+  while (const auto posed = next_posed(pending_depth_)) dispatch(DepthPosed{*posed});
+}
+
+void Machine::correct_stamps(const StampOffsets& offsets) {
+  color_offset_ = seconds(offsets.color_s);
+  depth_offset_ = seconds(offsets.depth_s);
+}
+
+// ---- frames on the way between calibration views
+
+void Machine::note_way_frame(const MachineEvent& event) {
+  if (!travelling_ || on_the_way_ != OnTheWay::kSeeBoard || !settings_.see_on_the_way) return;
+  if (const auto* color = std::get_if<ColorFrameArrived>(&event)) {
+    const bool wanted = !way_color_ && way_job_ == 0 && now_ - last_seen_on_the_way_ >= kWayFramesApart &&
+                        seen_of_motion_ < kWayFramesOfMotion && seen_on_the_way_ < kWayFramesMax;
+    if (!wanted) return;
+    way_color_ = color->frame;
+    way_depth_.reset();
+    last_seen_on_the_way_ = now_;
+  } else if (const auto* depth = std::get_if<DepthFrameArrived>(&event)) {
+    if (way_color_ && !way_depth_) way_depth_ = depth->frame;
   }
-  if (pending_depth_ && pending_depth_->stamp <= arm_.stamp) {
-    const auto joints = joints_at(pending_depth_->stamp);
-    const hal::Frame frame = *pending_depth_;
-    pending_depth_.reset();
-    if (joints) dispatch(DepthPosed{{frame, *joints}});
+}
+
+/// Starts the job when the arm has reported for long enough after the frames; frames before what is remembered of the
+/// arm are of no use.
+void Machine::see_way_frames() {
+  if (!way_color_) return;
+  WayArguments way;
+  way.color = *way_color_;
+  way.has_depth = way_depth_.has_value();
+  way.depth = way_depth_.value_or(hal::Frame{});
+  const Instant first = way.has_depth ? std::min(way.color.stamp, way.depth.stamp) : way.color.stamp;
+  const Instant last = way.has_depth ? std::max(way.color.stamp, way.depth.stamp) : way.color.stamp;
+  if (arm_.stamp < last + kJointsAround) return;
+  way_color_.reset();
+  for (std::size_t i = 0; i < history_size_ && !way.joints.full(); ++i) {
+    const hal::ArmState& state = history_[i];
+    const bool begins = i + 1 < history_size_ && history_[i + 1].stamp > first - kJointsAround;
+    const bool apart = way.joints.empty() || state.stamp - way.joints.back().stamp >= kJointsApart;
+    if (begins && apart) way.joints.push_back({state.stamp, state.position_rad});
+    if (state.stamp > last + kJointsAround) break;
   }
+  way.motion = motion_;
+  ++seen_of_motion_;
+  ++seen_on_the_way_;
+  const std::uint32_t awaited = awaited_;
+  way_job_ = start_job(JobKind::kSeeOnTheWay, way);
+  awaited_ = awaited;
 }
 
 // ---- trips
 
-void Machine::start_trip(const Route& path, bool map_on_the_way) {
+void Machine::start_trip(const Route& path, OnTheWay on_the_way) {
   path_ = path;
   leg_ = 0;
   travelling_ = true;
-  map_on_the_way_ = map_on_the_way;
+  on_the_way_ = on_the_way;
+  ++motion_;
+  seen_of_motion_ = 0;
   last_depth_ = now_;
   last_way_frame_ = now_;
   if (!path_.empty()) send_leg();
@@ -266,10 +344,10 @@ Machine::Trip Machine::advance_trip(const MachineEvent& event) {
   if (const auto* refused = std::get_if<CommandRefused>(&event)) return interrupt_trip(refused->fault);
   if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kSupervise) {
     set_timer(MachineTimer::kSupervise, kSupervisePeriod_s);
-    if (map_on_the_way_ && now_ - last_depth_ > seconds(kDepthStale_s)) stop_for(Fault::kStreamStale);
+    if (on_the_way_ == OnTheWay::kMap && now_ - last_depth_ > seconds(kDepthStale_s)) stop_for(Fault::kStreamStale);
     return Trip::kUnderWay;
   }
-  if (const auto* posed = std::get_if<DepthPosed>(&event); posed && map_on_the_way_ && !integrating()) {
+  if (const auto* posed = std::get_if<DepthPosed>(&event); posed && on_the_way_ == OnTheWay::kMap && !integrating()) {
     if (settings_.frames_while_moving_hz > 0 &&
         posed->frame.frame.stamp - last_way_frame_ >= seconds(1 / settings_.frames_while_moving_hz)) {
       last_way_frame_ = posed->frame.frame.stamp;
@@ -306,6 +384,7 @@ void Machine::open_look(double wait_s) {
   look_open_ = false;
   look_unposed_ = false;
   look_.clear();
+  depth_beside_.clear();
   set_timer(MachineTimer::kSettle, wait_s);
 }
 
@@ -329,6 +408,10 @@ bool Machine::advance_look(const MachineEvent& event) {
   const PosedFrame* posed = nullptr;
   if (const auto* color = std::get_if<ColorPosed>(&event); color && !look_depth_) posed = &color->frame;
   if (const auto* depth = std::get_if<DepthPosed>(&event); depth && look_depth_) posed = &depth->frame;
+  if (const auto* depth = std::get_if<DepthPosed>(&event); depth && !look_depth_ && look_open_) {
+    const bool wanted = settings_.depth_beside && !depth_beside_.full() && depth->frame.frame.stamp >= look_from_;
+    if (wanted) depth_beside_.push_back(depth->frame);
+  }
   if (posed == nullptr || !look_open_ || posed->frame.stamp < look_from_) return false;
   look_.push_back(*posed);
   if (look_.size() < look_count_) return false;

@@ -24,7 +24,9 @@ struct MachineSettings {
   int frames_per_view = 3;
   int calibration_views_min = 8;
   int calibration_views_max = 30;
-  int verify_views = 3;  ///< views of the board that a stored calibration is tested on at least
+  int verify_views = 3;        ///< views of the board that a stored calibration is tested on at least
+  bool depth_beside = true;    ///< depth frames beside the colour frames of calibration views
+  bool see_on_the_way = true;  ///< frames between calibration views, for the offsets of the stamps
   int explore_views_max = 60;
   double mapping_time_max_s =
       480;  ///< from the first look on: what was seen first must not be too old for the way back
@@ -114,7 +116,8 @@ class Machine {
   void finish(const Ending& ending);
 
   /// The path being driven. Leg by leg: each is one segment without blend.
-  void start_trip(const Route& path, bool map_on_the_way);
+  enum class OnTheWay : std::uint8_t { kNothing, kMap, kSeeBoard };
+  void start_trip(const Route& path, OnTheWay on_the_way);
   enum class Trip : std::uint8_t { kNone, kUnderWay, kArrived, kInterrupted };
   /// Feeds an event to the trip; kArrived and kInterrupted are reported once.
   [[nodiscard]] Trip advance_trip(const MachineEvent& event);
@@ -130,6 +133,11 @@ class Machine {
   [[nodiscard]] std::uint32_t looks() const { return looks_; }
   [[nodiscard]] bool advance_look(const MachineEvent& event);  ///< true once, when the frames are there
   [[nodiscard]] const FixedVector<PosedFrame, 8>& look() const { return look_; }
+  /// Depth frames that came while colour frames were collected.
+  [[nodiscard]] const FixedVector<PosedFrame, kDepthBesideMax>& depth_beside() const { return depth_beside_; }
+
+  /// From now on frames are taken for that much later (or earlier) than their stamps say.
+  void correct_stamps(const StampOffsets& offsets);
 
   /// Starts an integration of a depth frame; its result comes to whoever is in charge then.
   void integrate(const PosedFrame& frame, bool at_view);
@@ -144,7 +152,11 @@ class Machine {
   void run_transitions();
   void enter_path_to(StateId target);
   void remember_arm(const ArmReported& report);
+  template <typename Frames>
+  [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending);
   void pose_pending_frames();
+  void note_way_frame(const MachineEvent& event);
+  void see_way_frames();
   [[nodiscard]] std::optional<JointVector> joints_at(Instant stamp) const;
   void send_leg();
   [[nodiscard]] double deviation_m() const;
@@ -166,7 +178,10 @@ class Machine {
   static constexpr std::size_t kArmHistory = 64;
   std::array<hal::ArmState, kArmHistory> history_{};
   std::size_t history_size_ = 0;
-  std::optional<hal::Frame> pending_color_, pending_depth_;
+  /// Frames whose stamps the arm has not reached yet: a clock that is 0.2 s ahead makes 30 Hz wait for six.
+  using PendingFrames = FixedVector<hal::Frame, 8>;
+  PendingFrames pending_color_, pending_depth_;
+  Duration color_offset_{}, depth_offset_{};
   Instant last_depth_{};
 
   std::uint32_t job_number_ = 0;
@@ -175,7 +190,13 @@ class Machine {
   std::array<std::byte, 8192> arguments_{};
 
   bool travelling_ = false;
-  bool map_on_the_way_ = false;
+  OnTheWay on_the_way_ = OnTheWay::kNothing;
+  std::optional<hal::Frame> way_color_, way_depth_;  ///< wait until the arm's joints after them are known
+  Instant last_seen_on_the_way_{};
+  std::uint32_t motion_ = 0;
+  std::uint32_t seen_of_motion_ = 0;  ///< frames, of this motion
+  std::uint32_t seen_on_the_way_ = 0;
+  std::uint32_t way_job_ = 0;
   Route path_;
   std::size_t leg_ = 0;
   JointVector leg_start_;
@@ -189,6 +210,7 @@ class Machine {
   std::uint32_t looks_ = 0;
   Instant look_from_{};
   FixedVector<PosedFrame, 8> look_;
+  FixedVector<PosedFrame, kDepthBesideMax> depth_beside_;
 };
 
 }  // namespace firstlook

@@ -20,7 +20,19 @@ StoredCalibration stored_form(const RunRecord& record) {
   }
   StoredCalibration c = stored_calibration(*record.hand_eye, record.solver, record.provenance.arm_model);
   c.intrinsics = record.intrinsics;
-  c.camera_T_depth = record.camera_T_depth;
+  if (!record.alignment) return c;
+  const DepthCameraRecord& depth = record.alignment->depth_camera;
+  c.camera_T_depth = depth.mount.camera_T_depth;
+  if (depth.source == ValueSource::kEstimated) {
+    c.depth_mount = depth.mount;
+    c.stated_camera_T_depth = depth.stated;
+  }
+  const auto stored = [](const StampRecord& stamps) {
+    return stamps.source == ValueSource::kEstimated ? std::optional(StoredOffset{stamps.offset_s, stamps.sigma_s})
+                                                    : std::nullopt;
+  };
+  c.color_offset = stored(record.alignment->color_stamps);
+  c.depth_offset = stored(record.alignment->depth_stamps);
   return c;
 }
 

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/calibration/depth_to_color.hpp"
 #include "algorithms/calibration/solver_comparison.hpp"
+#include "algorithms/calibration/time_offset.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/verification.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
@@ -222,6 +224,34 @@ struct Provenance {
   std::string journal_hash;
 };
 
+/// Where a value came from that the cart can find out or take as given.
+enum class ValueSource : std::uint8_t { kGiven, kEstimated, kStored };
+
+/// Where the depth camera sits on the colour camera, as the job took it.
+struct DepthCameraRecord {
+  ValueSource source = ValueSource::kGiven;
+  std::string reason;  ///< why it was not estimated although that was asked for
+  Transform<Camera, Depth> stated;
+  DepthMount mount;  ///< as used; a given one is exact
+  int views = 0;     ///< calibration views that showed the board's plane
+  std::optional<DepthToColor> estimate;
+};
+
+/// What was added to a camera's stamps.
+struct StampRecord {
+  ValueSource source = ValueSource::kGiven;
+  std::string reason;
+  double offset_s = 0;
+  double sigma_s = 0;
+  std::optional<TimeOffset> estimate;
+};
+
+/// How the sensors stand to each other in space and time.
+struct AlignmentRecord {
+  DepthCameraRecord depth_camera;
+  StampRecord color_stamps, depth_stamps;
+};
+
 /// A calibration of an earlier job, and what its test on this one's views of the board said.
 struct VerifiedCalibration {
   StoredCalibration calibration;             ///< `accepted` as of the test
@@ -243,7 +273,7 @@ struct RunRecord {
   std::optional<SolverComparison> comparison;   ///< of recorded data alone
   std::vector<std::string> target_names;        ///< by HandEyeResult::targets; empty when there is but one target
   CameraIntrinsics intrinsics;                  ///< of the colour camera; width 0: unknown, no camera_info.yaml
-  Transform<Camera, Depth> camera_T_depth;
+  std::optional<AlignmentRecord> alignment;     ///< empty: recorded data
   std::vector<CalibrationViewRecord> calibration_views;
 
   std::optional<MappingRecord> mapping;

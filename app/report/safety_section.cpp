@@ -13,8 +13,10 @@ std::string millimetres(double metres) { return fmt::format("{:.1f}", metres * 1
 std::string clearance_table(const ClearanceTerms& c) {
   HtmlTable table({"term of the clearance", "mm"}, 1);
   table.row({"half a voxel diagonal", millimetres(c.half_voxel_diagonal_m)});
-  table.row({fmt::format("3σ of what was seen: hand-eye {:.1f}, depth {:.1f}, tracking {:.1f} mm (1σ each)",
-                         c.sigma_hand_eye_m * 1e3, c.sigma_depth_m * 1e3, c.sigma_tracking_m * 1e3),
+  table.row({fmt::format("3σ of what was seen: hand-eye {:.1f}, depth {:.1f}, depth camera {:.1f}, tracking {:.1f} mm "
+                         "(1σ each)",
+                         c.sigma_hand_eye_m * 1e3, c.sigma_depth_m * 1e3, c.sigma_depth_camera_m * 1e3,
+                         c.sigma_tracking_m * 1e3),
              millimetres(c.uncertainty_m)});
   table.row({"sag under payload", millimetres(c.payload_sag_m)});
   table.row({"stopping distance", millimetres(c.stopping_m)});

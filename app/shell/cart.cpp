@@ -283,7 +283,7 @@ RunRecord Cart::record() const {
   r.hand_eye = bench_->hand_eye();
   r.solver = config_.calibration.solver;
   r.intrinsics = bench_->camera();
-  r.camera_T_depth = bench_->facts().camera_T_depth;
+  r.alignment = bench_->alignment();
   r.verified = bench_->verified();
   r.calibration_views = bench_->calibration_records();
   if (bench_->mapped()) {

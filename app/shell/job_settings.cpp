@@ -31,6 +31,8 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.calibration_views_min = config.calibration.views_min;
   s.calibration_views_max = config.calibration.views_max;
   s.verify_views = config.calibration.verify_views;
+  s.see_on_the_way = config.calibration.time_offset == "estimate";
+  s.depth_beside = config.calibration.depth == "estimate";
   s.explore_views_max = config.explore.views_max;
   s.frames_while_moving_hz = config.explore.frames_while_moving_hz;
   if (config.parking_rad) s.parking_rad = *config.parking_rad;

@@ -9,7 +9,7 @@
 namespace firstlook::sim {
 namespace {
 
-enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kSwitch, kInterval };
+enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kMount, kSwitch, kInterval };
 
 struct Knob {
   std::string_view name;
@@ -29,6 +29,8 @@ constexpr std::array kKnobs = {
     Knob{"depth.clock", Kind::kOffset, &Faults::depth_clock_offset_s},
     Knob{"color.focal", Kind::kRelative, &Faults::color_focal_error},
     Knob{"color.center", Kind::kPixels, &Faults::color_center_error_px},
+    Knob{"depth.shift", Kind::kMount, &Faults::depth_shift_mm},
+    Knob{"depth.tilt", Kind::kMount, &Faults::depth_tilt_mrad},
     Knob{"link.lost_at", Kind::kTime, &Faults::link_lost_s},
     Knob{"arm.protective_stop_at", Kind::kTime, &Faults::protective_stop_s},
     Knob{"arm.emergency_stop_at", Kind::kTime, &Faults::emergency_stop_s},
@@ -88,6 +90,9 @@ bool set_knob(const Knob& knob, std::string_view text, Faults& faults) {
       break;
     case Kind::kPixels:
       if (!read_number(text, number) || std::abs(number) > 100) return false;
+      break;
+    case Kind::kMount:
+      if (!read_number(text, number) || std::abs(number) > 50) return false;
       break;
     case Kind::kInterval: {
       const std::size_t colon = text.find(':');

@@ -23,6 +23,8 @@ struct Faults {
   double depth_clock_offset_s = 0;    ///< depth.clock
   double color_focal_error = 0;       ///< color.focal: the camera states focal lengths too large by this share
   double color_center_error_px = 0;   ///< color.center: and a centre too far right and down by so many pixels
+  double depth_shift_mm = 0;          ///< depth.shift: the depth camera sits so far from where its maker states it
+  double depth_tilt_mrad = 0;         ///< depth.tilt: and is turned by so much
   double link_lost_s = kNever;        ///< link.lost_at: no reports, no commands
   double protective_stop_s = kNever;  ///< arm.protective_stop_at
   double emergency_stop_s = kNever;   ///< arm.emergency_stop_at

@@ -68,6 +68,13 @@ CameraIntrinsics stated_intrinsics(CameraIntrinsics camera, const Faults& faults
   return camera;
 }
 
+/// What its maker says of the depth camera's place: off by a shift along (1, -1, 1) and a turn about (1, 1, -1).
+Transform<Camera, Depth> stated_mount(const Transform<Camera, Depth>& mount, const Faults& faults) {
+  const Eigen::Vector3d shift = 1e-3 * faults.depth_shift_mm * Eigen::Vector3d(1, -1, 1).normalized();
+  const Eigen::AngleAxisd turn(1e-3 * faults.depth_tilt_mrad, Eigen::Vector3d(1, 1, -1).normalized());
+  return {Eigen::Quaterniond(turn) * mount.quaternion(), mount.translation() + shift};
+}
+
 CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail) {
   CellDescription d;
   d.name = scene.name;
@@ -78,7 +85,7 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
   d.depth_range_min_m = renderer.sensor().range_min_m;
   d.depth_range_max_m = renderer.sensor().range_max_m;
   d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
-  d.camera_T_depth = scene.mount.camera_T_depth;
+  d.camera_T_depth = stated_mount(scene.mount.camera_T_depth, faults);
   d.board = scene.board.spec;
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;

@@ -26,7 +26,7 @@ void take(Machine& m, const CalibrationViewResult& choice) {
     } else {
       m.show("calibration view {}: a small turn, to learn where the camera sits", p.observations + 1);
     }
-    m.start_trip(choice.path, false);
+    m.start_trip(choice.path, Machine::OnTheWay::kSeeBoard);
   } else if (enough) {
     m.transition(StateId::kSolve);
   } else {
@@ -43,7 +43,8 @@ Handled on_collect(Machine& m, const MachineEvent& event) {
   if (const auto choice = m.result_of<CalibrationViewResult>(JobKind::kNextCalibrationView, event)) {
     take(m, *choice);
   } else if (m.advance_look(event)) {
-    m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kCollect, p.observations, m.look(), m.looks()});
+    m.start_job(JobKind::kDetectBoard,
+                DetectArguments{BoardLook::kCollect, p.observations, m.look(), m.looks(), m.depth_beside()});
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
     if (!seen->still && m.look_again(seen->moved_px)) return Handled::kNo;
     if (seen->found) {

@@ -11,7 +11,7 @@ void enter_verify_board(Machine& m) {
 Handled on_verify_board(Machine& m, const MachineEvent& event) {
   if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {
-      m.start_trip(plan->path, true);
+      m.start_trip(plan->path, Machine::OnTheWay::kMap);
     } else {
       m.conclude(Outcome::kSafelyStopped, plan->fault);
     }
@@ -46,7 +46,8 @@ void enter_park(Machine& m) {
 Handled on_park(Machine& m, const MachineEvent& event) {
   if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {
-      m.start_trip(plan->path, phase_of(m) == MotionPhase::kMapping);
+      m.start_trip(plan->path,
+                   phase_of(m) == MotionPhase::kMapping ? Machine::OnTheWay::kMap : Machine::OnTheWay::kNothing);
     } else {
       m.show("no certified way to the parking pose: the arm stays where it is");
       m.transition(StateId::kReport);

@@ -64,7 +64,7 @@ void enter_move(Machine& m) {
   } else {
     m.show("view {}: another look, to have room to move", next_number(p));
   }
-  m.start_trip(p.chosen.path, true);
+  m.start_trip(p.chosen.path, Machine::OnTheWay::kMap);
 }
 
 Handled on_move(Machine& m, const MachineEvent& event) {

@@ -46,7 +46,7 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
     next_motion(m);
   } else if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {
-      m.start_trip(plan->path, false);
+      m.start_trip(plan->path, Machine::OnTheWay::kNothing);
     } else {
       ++p.view;
       next_motion(m);

@@ -41,7 +41,7 @@ Handled on_locate_board(Machine& m, const MachineEvent& event) {
     }
   } else if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {
-      m.start_trip(plan->path, false);
+      m.start_trip(plan->path, Machine::OnTheWay::kNothing);
     } else {
       next_view(m);
     }

@@ -19,7 +19,7 @@ void take(Machine& m, const NextViewResult& choice) {
   Progress& p = m.progress();
   if (choice.found) {
     m.show("sweep view {}", p.sweep_views + 1);
-    m.start_trip(choice.path, true);
+    m.start_trip(choice.path, Machine::OnTheWay::kMap);
   } else if (choice.blocked && ++p.replans <= kReplansMax) {
     look_around(m);
   } else if (choice.blocked) {
@@ -57,7 +57,7 @@ Handled on_sweep(Machine& m, const MachineEvent& event) {
   }
   if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {
-      m.start_trip(plan->path, false);
+      m.start_trip(plan->path, Machine::OnTheWay::kNothing);
     } else {
       m.start_look(true, 1);
     }

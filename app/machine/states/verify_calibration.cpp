@@ -33,7 +33,7 @@ void take(Machine& m, const VerificationViewResult& choice) {
     } else {
       m.show("verification view {}", views + 1);
     }
-    m.start_trip(choice.path, false);
+    m.start_trip(choice.path, Machine::OnTheWay::kNothing);
   }
 }
 
@@ -47,6 +47,7 @@ void conclude(Machine& m, const VerifyResult& result) {
     m.conclude(Outcome::kDone, std::nullopt);
   } else {
     m.progress().calibration_accepted = true;
+    m.correct_stamps(result.offsets);
     m.show("the stored calibration holds; clearance {:.0f} mm", 1000 * result.clearance_m);
     m.transition(StateId::kSweep);
   }
@@ -60,7 +61,7 @@ Handled on_verify_calibration(Machine& m, const MachineEvent& event) {
   Progress& p = m.progress();
   if (const auto plan = m.result_of<PlanResult>(JobKind::kPlan, event)) {
     if (plan->found) {
-      m.start_trip(plan->path, false);
+      m.start_trip(plan->path, Machine::OnTheWay::kNothing);
     } else {
       ++p.failed_looks;
       next_view(m);
