@@ -104,6 +104,9 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
   if (bench.hand_eye()) {
     claims.flange_T_camera = bench.hand_eye()->flange_T_camera;
     claims.covariance = bench.hand_eye()->covariance;
+    claims.camera_T_depth = bench.alignment().depth_camera.mount.camera_T_depth;
+    claims.color_offset_s = bench.alignment().color_stamps.offset_s;
+    claims.depth_offset_s = bench.alignment().depth_stamps.offset_s;
   }
   if (bench.mapped()) claims.map = &bench.map();
   claims.now_s = bench.last_stamp_s();
@@ -118,6 +121,10 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
   truth.hand_eye_error_mm = figures.hand_eye_error_mm;
   truth.hand_eye_error_mrad = figures.hand_eye_error_mrad;
   truth.hand_eye_mahalanobis2 = figures.hand_eye_mahalanobis2;
+  truth.depth_camera_error_mm = figures.depth_camera_error_mm;
+  truth.depth_camera_error_mrad = figures.depth_camera_error_mrad;
+  truth.color_stamps_error_s = figures.color_stamps_error_s;
+  truth.depth_stamps_error_s = figures.depth_stamps_error_s;
   truth.contacts = figures.contacts;
   truth.unknown_entries = figures.unknown_entries;
   truth.coverage_of_observable = figures.coverage_of_observable;
@@ -130,6 +137,27 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
     const sim::RegionFigure& region = figures.regions[i];
     truth.regions.push_back({region.name, region.observable, after_sweep[i].known_fraction, region.known_fraction});
     add_part_pictures(region, after_sweep[i].known_fraction, cart, record);
+  }
+}
+
+void narrate_alignment(const AlignmentRecord& alignment, Narrator& narrator) {
+  const DepthToColor& depth = *alignment.depth_camera.estimate;
+  const Vector7d sigma = alignment.depth_camera.mount.covariance.diagonal().cwiseSqrt();
+  std::string line =
+      fmt::format("sensors   depth camera {:.2f} ± {:.2f} mm, {:.2f} ± {:.2f} mrad from where it was stated",
+                  1e3 * depth.moved.head<3>().norm(), 1e3 * sigma.head<3>().maxCoeff(),
+                  1e3 * depth.moved.tail<3>().norm(), 1e3 * sigma.segment<3>(3).maxCoeff());
+  const auto add = [&line](std::string_view camera, const StampRecord& stamps) {
+    if (!stamps.estimate) return;
+    line += fmt::format("; {} stamps {:+.2f} ± {:.2f} ms", camera, 1e3 * stamps.offset_s, 1e3 * stamps.sigma_s);
+  };
+  add("colour", alignment.color_stamps);
+  add("depth", alignment.depth_stamps);
+  narrator.line(line);
+  if (depth.belief.contradicted()) {
+    narrator.line(
+        fmt::format("warning   what is stated of the depth camera is wrong: chi-square {:.1f}, allowed {:.1f}",
+                    depth.belief.chi2, depth.belief.chi2_limit));
   }
 }
 
@@ -147,6 +175,7 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
       narrator.line(fmt::format("verified  on {} views: chi-square {:.1f}, allowed {:.1f}; {:.2f} px, {:.2f} mm RMS",
                                 v.views.size(), v.chi2, v.chi2_limit, v.residual_rms_px, v.residual_rms_m * 1e3));
     }
+    if (record.alignment && record.alignment->depth_camera.estimate) narrate_alignment(*record.alignment, narrator);
     for (const std::string& reason : record.hand_eye->reasons) narrator.line("rejected  " + reason);
   }
   if (record.mapping) {

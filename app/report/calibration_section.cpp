@@ -178,6 +178,7 @@ std::string hand_eye_section(const RunRecord& record) {
       "<p>Pose of the camera (optical frame: z forward, x right, y down) in the flange <code>tool0</code>.</p>\n";
   body += transform_table(h) + "<h3>How good it is</h3>\n";
   body += record.verified ? verification_table(record) : quality_table(record);
+  body += alignment_table(record);
   if (h.likely_mistake) body += "<p class=\"hint\">" + escape_html(h.likely_mistake->text) + ".</p>\n";
   body += snippets(h);
   return section("hand-eye", "Where the camera sits on the arm", body);

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/report/alignment_json.hpp"
 #include "app/report/hand_eye_json.hpp"
 #include "app/report/ros_files.hpp"
 #include "app/report/settling.hpp"
@@ -83,6 +84,10 @@ Json truth_json(const TruthRecord& truth) {
   return {{"hand_eye_error_mm", or_null(truth.hand_eye_error_mm)},
           {"hand_eye_error_mrad", or_null(truth.hand_eye_error_mrad)},
           {"hand_eye_mahalanobis2", or_null(truth.hand_eye_mahalanobis2)},
+          {"depth_camera_error_mm", or_null(truth.depth_camera_error_mm)},
+          {"depth_camera_error_mrad", or_null(truth.depth_camera_error_mrad)},
+          {"color_stamps_error_s", or_null(truth.color_stamps_error_s)},
+          {"depth_stamps_error_s", or_null(truth.depth_stamps_error_s)},
           {"contacts", truth.contacts},
           {"unknown_entries", truth.unknown_entries},
           {"coverage_of_observable", or_null(truth.coverage_of_observable)},
@@ -125,6 +130,9 @@ std::string result_json(const RunRecord& record) {
     describe_targets(*record.hand_eye, record.target_names, hand_eye);
     json["hand_eye"] = hand_eye;
   }
+  const bool aligned = record.hand_eye && record.alignment;
+  json["depth_camera"] = aligned ? Json(depth_camera_json(record.alignment->depth_camera)) : Json(nullptr);
+  json["time_offset"] = aligned ? Json(time_offset_json(*record.alignment)) : Json(nullptr);
   json["mapping"] = record.mapping ? mapping_json(*record.mapping) : Json(nullptr);
   json["safety"] = record.safety ? safety_json(*record.safety) : Json(nullptr);
   json["memory"] = record.memory ? memory_json(*record.memory) : Json(nullptr);

@@ -193,6 +193,10 @@ struct TruthRecord {
   std::optional<double> hand_eye_error_mm;
   std::optional<double> hand_eye_error_mrad;
   std::optional<double> hand_eye_mahalanobis2;
+  std::optional<double> depth_camera_error_mm;  ///< of its place on the colour camera
+  std::optional<double> depth_camera_error_mrad;
+  std::optional<double> color_stamps_error_s;  ///< after correction: positive when they are still ahead of the arm
+  std::optional<double> depth_stamps_error_s;
   std::uint64_t contacts = 0;
   std::uint64_t unknown_entries = 0;
   std::optional<double> coverage_of_observable;  ///< 0..1

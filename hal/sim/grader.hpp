@@ -34,6 +34,8 @@ struct FinalClaims {
   std::optional<Transform<Flange, Camera>> flange_T_camera;
   /// Translation m, rotation rad; left perturbation in the flange frame: R = Exp(d_r) R_estimate, t = t_estimate + d_t.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  std::optional<Transform<Camera, Depth>> camera_T_depth;
+  std::optional<double> color_offset_s, depth_offset_s;  ///< added to the cameras' stamps
   const VoxelMap* map = nullptr;
   double now_s = 0;  ///< for the age of what is known free
   double free_max_age_s = 600;
@@ -55,6 +57,10 @@ struct TruthFigures {
   std::optional<double> hand_eye_error_mm;    ///< distance of the camera's origin
   std::optional<double> hand_eye_error_mrad;  ///< angle of the rotation between estimate and truth
   std::optional<double> hand_eye_mahalanobis2;
+  std::optional<double> depth_camera_error_mm;  ///< of its place on the colour camera
+  std::optional<double> depth_camera_error_mrad;
+  std::optional<double> color_stamps_error_s;  ///< after correction: positive when they are still ahead of the arm
+  std::optional<double> depth_stamps_error_s;
   std::uint64_t contacts = 0;
   std::uint64_t unknown_entries = 0;
   std::optional<double> coverage_of_observable;

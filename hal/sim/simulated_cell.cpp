@@ -93,7 +93,8 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
   return d;
 }
 
-Truth truth_of(const Scene& scene, const ArmModel& model, const SceneSpan& span, const SimulationOptions& options) {
+Truth truth_of(const Scene& scene, const ArmModel& model, const SceneSpan& span, const Faults& faults,
+               const SimulationOptions& options) {
   Truth truth;
   truth.arm = model;
   truth.world = &span.world;
@@ -105,6 +106,8 @@ Truth truth_of(const Scene& scene, const ArmModel& model, const SceneSpan& span,
   for (const Region& region : scene.keep_out) truth.space.keep_out_boxes.push_back({region.low_m, region.high_m});
   truth.start_rad = scene.start_rad;
   for (const Region& region : scene.regions) truth.regions.push_back({region.name, region.low_m, region.high_m});
+  truth.color_clock_s = faults.color_clock_offset_s;
+  truth.depth_clock_s = faults.depth_clock_offset_s;
   truth.seed = options.seed;
   truth.workers = options.workers;
   return truth;
@@ -126,7 +129,7 @@ class Cell final : public SimulatedCell {
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
         description_(describe_cell(scene_, first_.renderer, faults, detail(options))),
-        grader_(truth_of(scene_, model, first_, options)),
+        grader_(truth_of(scene_, model, first_, faults, options)),
         watcher_(grader_.monitor(), scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
         rig_(model, scene_.mount, arm_),

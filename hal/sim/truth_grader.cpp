@@ -87,6 +87,16 @@ void TruthGrader::grade_hand_eye(const FinalClaims& claims, TruthFigures& figure
   }
 }
 
+void TruthGrader::grade_alignment(const FinalClaims& claims, TruthFigures& figures) const {
+  if (claims.camera_T_depth) {
+    const Vector6d d = difference(truth_.camera_T_depth.pose(), claims.camera_T_depth->pose());
+    figures.depth_camera_error_mm = 1e3 * d.head<3>().norm();
+    figures.depth_camera_error_mrad = 1e3 * d.tail<3>().norm();
+  }
+  if (claims.color_offset_s) figures.color_stamps_error_s = truth_.color_clock_s + *claims.color_offset_s;
+  if (claims.depth_offset_s) figures.depth_stamps_error_s = truth_.depth_clock_s + *claims.depth_offset_s;
+}
+
 void TruthGrader::grade_map(const FinalClaims& claims, TruthFigures& figures) {
   if (claims.map == nullptr || !camera_on_flange()) return;
   const VoxelMap& map = *claims.map;
@@ -114,6 +124,7 @@ TruthFigures TruthGrader::grade(const FinalClaims& claims) {
   figures.unknown_entries = monitor_.unknown_entries();
   figures.body_checks = monitor_.checks();
   grade_hand_eye(claims, figures);
+  grade_alignment(claims, figures);
   grade_map(claims, figures);
   return figures;
 }

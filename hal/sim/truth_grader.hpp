@@ -27,7 +27,8 @@ struct Truth {
   Pose link_T_camera = Pose::Identity();
   Transform<Camera, Depth> camera_T_depth;
   CameraIntrinsics depth;
-  FreeSpace space;  ///< safe zone and keep-outs as configured
+  double color_clock_s = 0, depth_clock_s = 0;  ///< how far the cameras' stamps are ahead
+  FreeSpace space;                              ///< safe zone and keep-outs as configured
   JointVector start_rad;
   std::vector<NamedRegion> regions;
   std::uint64_t seed = 1;
@@ -54,6 +55,7 @@ class TruthGrader final : public Grader {
   [[nodiscard]] bool camera_on_flange() const { return truth_.link == truth_.arm.joints; }
   /// Computed once for each geometry and set of options.
   const ObservableSet& observable(const GridGeometry& geometry, const ObservableOptions& options);
+  void grade_alignment(const FinalClaims& claims, TruthFigures& figures) const;
   void grade_hand_eye(const FinalClaims& claims, TruthFigures& figures) const;
   void grade_map(const FinalClaims& claims, TruthFigures& figures);
 
