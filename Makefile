@@ -25,7 +25,7 @@ test-asan: deps ## the same under AddressSanitizer and UndefinedBehaviorSanitize
 	@toolchain/build asan-ubsan all
 	@ctest --test-dir build/asan-ubsan --output-on-failure --progress -j "$$(toolchain/jobs)" $(ARGS)
 
-bench: ## figures against their peers, into build/bench.json; ONLY=calibration|view_design|detection|map|gain|motion|views|loop
+bench: ## figures against their peers, into build/bench.json; ONLY=calibration|intrinsics|bundle|view_design|detection|map|gain|motion|views|loop
 	@toolchain/install-dependencies bench
 	@toolchain/build release firstlook_bench
 	@build/release/tests/bench/firstlook_bench --json build/bench.json $(if $(ONLY),--only $(ONLY)) $(ARGS)

@@ -91,7 +91,7 @@ Result<IntrinsicsEstimate> estimate_intrinsics(int width, int height, const Targ
   }
   try {
     cv::setNumThreads(1);
-    const IntrinsicsEstimate estimate = calibrate(width, height, targets, views);
+    IntrinsicsEstimate estimate = calibrate(width, height, targets, views);
     if (!is_usable(estimate.camera) || !(estimate.reprojection_rms_px < 5)) {
       return failure(Fault::kSolveFailed,
                      "the camera's intrinsics cannot be told from these views: fx {:.0f}, RMS {:.1f} px",

@@ -107,6 +107,7 @@ std::array<double, sizeof...(Contestants)> medians_taking_turns(int rounds, Cont
 // ---- the topics, one file each
 void bench_calibration(const Options& options, Report& report);
 void bench_intrinsics(const Options& options, Report& report);
+void bench_bundle(const Options& options, Report& report);
 void bench_view_design(const Options& options, Report& report);
 void bench_detection(const Options& options, Report& report);
 void bench_map(const Options& options, Report& report);

@@ -18,6 +18,7 @@ struct Topic {
 constexpr Topic kTopics[] = {
     {"calibration", firstlook::bench::bench_calibration},
     {"intrinsics", firstlook::bench::bench_intrinsics},
+    {"bundle", firstlook::bench::bench_bundle},
     {"view_design", firstlook::bench::bench_view_design},
     {"detection", firstlook::bench::bench_detection},
     {"map", firstlook::bench::bench_map},
