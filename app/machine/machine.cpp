@@ -14,6 +14,7 @@ constexpr std::uint32_t kInterruptionsMax = 25;   // of one job; more means that
 // Frames on the way: joints are kept from so much before to so much after them, the largest offset of stamps that is
 // looked for (0.2 s) and two of the arm's reports.
 constexpr Duration kJointsAround = milliseconds(216);
+constexpr Duration kHistoryApart = milliseconds(7);  // an arm that reports more often is remembered as long
 constexpr Duration kJointsApart = milliseconds(15);  // every second report at 125 Hz
 constexpr Duration kWayFramesApart = milliseconds(250);
 constexpr std::uint32_t kWayFramesOfMotion = 5;
@@ -163,7 +164,10 @@ void Machine::finish(const Ending& ending) {
 // ---- the arm's reports and the frames' poses
 
 void Machine::remember_arm(const ArmReported& report) {
-  if (history_size_ == kArmHistory) {
+  const bool dense = history_size_ >= 2 && report.state.stamp - history_[history_size_ - 2].stamp < kHistoryApart;
+  if (dense) {
+    --history_size_;
+  } else if (history_size_ == kArmHistory) {
     std::copy(history_.begin() + 1, history_.end(), history_.begin());
     --history_size_;
   }

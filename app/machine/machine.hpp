@@ -175,7 +175,8 @@ class Machine {
   hal::ArmState arm_;
   double guardian_margin_m_ = 0;
   bool arm_known_ = false, color_seen_ = false, depth_seen_ = false;
-  static constexpr std::size_t kArmHistory = 64;
+  /// A second at 125 Hz: what frames on the way need, whose stamps may be off by 0.2 s either way.
+  static constexpr std::size_t kArmHistory = 128;
   std::array<hal::ArmState, kArmHistory> history_{};
   std::size_t history_size_ = 0;
   /// Frames whose stamps the arm has not reached yet: a clock that is 0.2 s ahead makes 30 Hz wait for six.

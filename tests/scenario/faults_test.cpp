@@ -134,6 +134,42 @@ TEST_CASE("a camera that states wrong intrinsics is found out, or has them estim
   CHECK(estimated["hand_eye"]["intrinsics"]["sigma"]["fx_px"] < 0.5);
 }
 
+TEST_CASE("a depth camera that sits elsewhere and stamps that are off are found, and the map uses what was found",
+          "[scenario]") {
+  const Json result = run_with("depth.shift=5,depth.tilt=8,color.clock=-0.02,depth.clock=0.04", kDone);
+  const Json& truth = result["truth"];
+  CHECK(truth["depth_camera_error_mm"] < 1.5);
+  CHECK(truth["depth_camera_error_mrad"] < 2);
+  CHECK(std::abs(truth["color_stamps_error_s"].get<double>()) < 1e-3);
+  CHECK(std::abs(truth["depth_stamps_error_s"].get<double>()) < 2e-3);
+  CHECK(truth["false_free_voxels"] == 0);
+  CHECK(result["depth_camera"]["source"] == "estimated");
+  CHECK(result["depth_camera"]["estimate"]["moved_mm"].get<double>() == Approx(5).margin(1.5));
+  CHECK(result["time_offset"]["color"]["offset_s"].get<double>() == Approx(0.02).margin(1e-3));
+  CHECK(result["time_offset"]["depth"]["offset_s"].get<double>() == Approx(-0.04).margin(2e-3));
+
+  const Json bent = run_with("depth.tilt=40", kDone);
+  CHECK(bent["depth_camera"]["estimate"]["stated"]["contradicted"] == true);
+  CHECK(bent["truth"]["depth_camera_error_mrad"] < 2);
+}
+
+TEST_CASE("a stored calibration brings depth camera and stamps along", "[scenario]") {
+  const JobFolder folder;
+  folder.write("short.yaml", "explore: {views_max: 2}\n");
+  const std::string faults = "depth.shift=5,depth.tilt=8,depth.clock=0.04";
+  REQUIRE(folder.run_job("cal", {"--only", "calibrate", "--faults", faults}).exit_code == 0);
+  const ProgramResult map = folder.run_job(
+      "map", {"--only", "map", "--calibration", "cal/hand_eye.yaml", "--config", "short.yaml", "--faults", faults});
+  INFO(map.err);
+  REQUIRE(map.exit_code == 0);
+  const Json made = folder.read_json("cal/result.json"), used = folder.read_json("map/result.json");
+  check_safe(used);
+  CHECK(used["depth_camera"]["source"] == "stored");
+  CHECK(used["time_offset"]["depth"]["source"] == "stored");
+  CHECK(used["time_offset"]["depth"]["offset_s"] == made["time_offset"]["depth"]["offset_s"]);
+  CHECK(used["truth"]["depth_camera_error_mm"] == made["truth"]["depth_camera_error_mm"]);
+}
+
 TEST_CASE("cameras that were never there, or stop, or hang, or have a wrong clock", "[scenario]") {
   const Expected missing{4, "faulted", "E5001"};
   run_with("color.stall_at=0", missing);

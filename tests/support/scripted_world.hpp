@@ -59,7 +59,11 @@ class ScriptedWorld : public DecisionSink {
     r.found = r.target_met = true;
     return r;
   }();
-  VerifyResult verify{.accepted = true};
+  VerifyResult verify = [] {
+    VerifyResult r;
+    r.accepted = true;
+    return r;
+  }();
   IntegrateResult integrated{.used = true, .path_free = true};
   CheckBoardResult check{.seen = true, .moved = false};
   int locate_views = 4;
@@ -80,6 +84,7 @@ class ScriptedWorld : public DecisionSink {
   std::vector<hal::Segment> segments;
   std::size_t segments_after_stop = 0;
   int forgotten = 0;
+  mutable int seen_on_the_way = 0;  ///< frames of moving cameras that were looked at
   bool ended = false;
   Ending ending;
   Instant now{};
@@ -172,6 +177,9 @@ class ScriptedWorld : public DecisionSink {
         return pack(SummarizeResult{}, result);
       case JobKind::kForgetKnownFree:
         return pack(NoArguments{}, result);
+      case JobKind::kSeeOnTheWay:
+        ++seen_on_the_way;
+        return pack(WayResult{true, true}, result);
     }
     ENSURE(9002, false);
     return 0;

@@ -43,6 +43,10 @@ Config all_changed() {
   c.board = {"charuco", 7, 5, 0.0251, 0.018, "5x5_100", 3, "yes", "thesis2014"};
   c.calibration = {"tsai-lenz",
                    "estimate",
+                   "given",
+                   2.5,
+                   4.5,
+                   "given",
                    "fixed48",
                    9,
                    53,

@@ -106,6 +106,40 @@ TEST_CASE("a written calibration reads back whole", "[hand_eye_file]") {
   CHECK(read->usable_distance_m == c.usable_distance_m);
 }
 
+TEST_CASE("what a calibration estimated of depth camera and stamps reads back, and is compared as stated",
+          "[hand_eye_file]") {
+  StoredCalibration c = sample();
+  const Transform<Camera, Depth> stated(Eigen::Quaterniond::Identity(), {-0.03, 0.001, 0});
+  DepthMount mount;
+  mount.camera_T_depth = *c.camera_T_depth;
+  mount.depth_scale = 1.003;
+  mount.covariance.diagonal() << 1e-8, 2e-8, 3e-8, 4e-8, 5e-8, 6e-8, 7e-8;
+  c.depth_mount = mount;
+  c.stated_camera_T_depth = stated;
+  c.color_offset = {-0.0301, 1e-4};
+  c.depth_offset = {0.002, 4e-4};
+  const std::string text = hand_eye_yaml(c);
+  const File file(text);
+  const auto read = read_hand_eye(file.path());
+  if (!read) FAIL(read.error().detail());
+  REQUIRE(read->depth_mount);
+  CHECK(read->depth_mount->depth_scale == 1.003);
+  CHECK((read->depth_mount->covariance - mount.covariance).norm() < 1e-20);
+  CHECK(pose_difference(read->depth_mount->camera_T_depth.pose(), mount.camera_T_depth.pose()).norm() < 1e-15);
+  CHECK(read->color_offset->offset_s == -0.0301);
+  CHECK(read->depth_offset->sigma_s == 4e-4);
+  const ArmModel arm = *find_arm_model("ur5");
+  CHECK(check_belongs(*read, arm, c.intrinsics, stated));
+  CHECK_FALSE(check_belongs(*read, arm, c.intrinsics, *c.camera_T_depth));
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string other = text;
+    return other.replace(other.find(from), from.size(), to);
+  };
+  CHECK_THAT(refused(changed("depth_scale: 1.003", "depth_scale: 3")), Contains("depth_scale"));
+  CHECK_THAT(refused(changed("offset_s: -0.0301", "offset_s: -30.1")), Contains("offset_s"));
+  CHECK_THAT(refused(changed("stated_translation_m: [-0.03", "stated_translation_m: [-30")), Contains("millimetres"));
+}
+
 TEST_CASE("a calibration that its own run rejected is refused, whatever else it says", "[hand_eye_file]") {
   StoredCalibration c = sample();
   c.accepted = false;

@@ -249,6 +249,32 @@ TEST_CASE("frames whose time the arm does not know are not a camera that stopped
   CHECK(world.ending.fault == Fault::kClockWrong);
 }
 
+TEST_CASE("frames on the way between calibration views are looked at, and nobody waits for them", "[machine]") {
+  ScriptedWorld world;
+  REQUIRE(world.run_until(StateId::kReady));
+  world.press(OperatorAction::kPlay);
+  CHECK(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+  CHECK(world.seen_on_the_way > 0);
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.see_on_the_way = false;
+  ScriptedWorld plain(settings);
+  REQUIRE(plain.run_until(StateId::kReady));
+  plain.press(OperatorAction::kPlay);
+  CHECK(plain.run_to_end());
+  CHECK(plain.seen_on_the_way == 0);
+}
+
+TEST_CASE("stamps that run ahead are corrected: frames wait until the arm has been there", "[machine]") {
+  ScriptedWorld world;
+  world.frame_age = milliseconds(-100);
+  world.solve.offsets = {-0.104, -0.104};
+  REQUIRE(world.run_until(StateId::kReady));
+  world.press(OperatorAction::kPlay);
+  CHECK(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+}
+
 TEST_CASE("a picture that still moves is looked at again, at once, and is not a view", "[machine]") {
   ScriptedWorld w;
   std::vector<std::uint32_t> looks;

@@ -52,8 +52,8 @@ using Keys = std::vector<std::string>;
 
 TEST_CASE("result.json keeps its schema", "[report]") {
   const ordered_json json = ordered_json::parse(result_json(sample_record()));
-  CHECK(keys_of(json) == Keys{"outcome", "reason", "seed", "cell", "phases", "decisions_hash", "hand_eye", "mapping",
-                              "safety", "memory", "wall", "truth"});
+  CHECK(keys_of(json) == Keys{"outcome", "reason", "seed", "cell", "phases", "decisions_hash", "hand_eye",
+                              "depth_camera", "time_offset", "mapping", "safety", "memory", "wall", "truth"});
   CHECK(json["outcome"] == "done");
   CHECK(json["seed"] == 7);
   CHECK(json["phases"].size() == 6);
@@ -84,8 +84,31 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(keys_of(json["memory"]) == Keys{"budget_bytes", "peak_bytes", "loop_allocations_after_seal"});
   for (const char* key : {"started", "total_s", "stall_s", "real_time", "rss_bytes", "job_heap_peak_bytes"})
     CHECK(json["wall"].contains(key));
-  CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2", "contacts",
-                                       "unknown_entries", "coverage_of_observable", "false_free_voxels", "regions"});
+  CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2",
+                                       "depth_camera_error_mm", "depth_camera_error_mrad", "color_stamps_error_s",
+                                       "depth_stamps_error_s", "contacts", "unknown_entries", "coverage_of_observable",
+                                       "false_free_voxels", "regions"});
+}
+
+TEST_CASE("what was found of depth camera and stamps is told, and what was not", "[report]") {
+  const ordered_json json = ordered_json::parse(result_json(sample_record()));
+  const ordered_json& depth = json["depth_camera"];
+  CHECK(depth["source"] == "estimated");
+  CHECK(depth["translation_m"][0].get<double>() == -0.0248);
+  CHECK(depth["sigma_translation_mm"][0].get<double>() == Approx(0.1));
+  CHECK(depth["sigma_rotation_mrad"][2].get<double>() == Approx(0.3));
+  CHECK(depth["depth_scale"].get<double>() == 1.002);
+  CHECK(depth["estimate"]["views_used"] == 15);
+  CHECK(depth["estimate"]["untold"][0]["direction"] == "translation along x");
+  CHECK(depth["estimate"]["stated"]["contradicted"] == true);
+  CHECK(json["time_offset"]["color"]["offset_s"].get<double>() == -0.0301);
+  CHECK(json["time_offset"]["color"]["frames"] == 36);
+  CHECK(json["time_offset"]["depth"]["source"] == "given");
+  CHECK(json["time_offset"]["depth"]["sigma_s"].is_null());
+  const std::string page = report_html(sample_record());
+  CHECK_THAT(page, Contains("-30.10 ± 0.10 ms"));
+  CHECK_THAT(page, Contains("contradicted"));
+  CHECK_THAT(page, Contains("too few frames &lt;on the way&gt;"));
 }
 
 TEST_CASE("sections that did not run are null, and numbers that are not finite, too", "[report]") {

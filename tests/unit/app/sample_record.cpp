@@ -147,6 +147,33 @@ SafetyRecord safety() {
   return {c, 0.0214, 0.0312, {{151.2, "paused by the operator"}}};
 }
 
+AlignmentRecord alignment() {
+  AlignmentRecord a;
+  DepthToColor depth;
+  depth.mount.camera_T_depth = Transform<Camera, Depth>(Eigen::Quaterniond::Identity(), {-0.0248, 0.0003, 0.0001});
+  depth.mount.depth_scale = 1.002;
+  depth.mount.covariance.diagonal() << 1e-8, 1e-8, 2e-8, 4e-8, 4e-8, 9e-8, 1e-6;
+  depth.moved << 2e-4, 3e-4, 1e-4, 1e-3, -2e-3, 4e-4;
+  depth.noise_at_1m = 0.0029;
+  depth.offset_rms_m = 6e-5;
+  depth.excess = {4e-4, 1e-3};
+  depth.untold = {{"translation along x", 0.93}};
+  depth.belief = {31.2, 6, 22.5};
+  depth.stops.resize(16);
+  depth.stops[3].used = false;
+  a.depth_camera = {ValueSource::kEstimated, {}, Transform<Camera, Depth>(), depth.mount, 16, depth};
+  TimeOffset offset;
+  offset.offset_s = -0.0301;
+  offset.sigma_s = 1e-4;
+  offset.frames = 36;
+  offset.motions = 14;
+  offset.left_out = 2;
+  offset.speed_max_m_s = 0.174;
+  a.color_stamps = {ValueSource::kEstimated, {}, offset.offset_s, offset.sigma_s, offset};
+  a.depth_stamps.reason = "too few frames <on the way>";
+  return a;
+}
+
 RunRecord make_record() {
   RunRecord r;
   Random random(7, 1);
@@ -175,7 +202,8 @@ RunRecord make_record() {
   r.provenance = {"0.1.0", "ur5", "full", "cell: workshop\n", "77aa01"};
   r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
             "runs/20260131-7",      2};
-  r.truth = TruthRecord{0.21, 0.34, 4.7, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
+  r.alignment = alignment();
+  r.truth = TruthRecord{0.21, 0.34, 4.7, 0.3, 0.4, 1e-5, -3e-4, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }
 
