@@ -237,7 +237,7 @@ Result<double> coarse_offset(const Problem& problem, const TimeOffsetOptions& op
 std::optional<Solution> refined(const Problem& problem, double range_s, double& offset_s) {
   constexpr double kStepMax_s = 0.02;
   for (int i = 0; i < kIterationsMax; ++i) {
-    const auto solution = solve_at(problem, offset_s);
+    auto solution = solve_at(problem, offset_s);
     if (!solution) return std::nullopt;
     offset_s = std::clamp(offset_s + std::clamp(solution->step_s, -kStepMax_s, kStepMax_s), -range_s, range_s);
     if (std::abs(solution->step_s) < kSettled_s) return solution;
@@ -373,7 +373,7 @@ Result<TimeOffset> estimate_time_offset(const TimedCell& cell, std::span<const M
     }
     left_out = static_cast<std::size_t>(std::count(problem.used.begin(), problem.used.end(), false));
     if (static_cast<double>(left_out) > options.left_out_max * static_cast<double>(taken.size())) {
-      return failure(Fault::kSolveFailed, "no offset of the stamps explains {} of {} frames on the way", left_out,
+      return failure(Fault::kClockWrong, "no offset of the stamps explains {} of {} frames on the way", left_out,
                      taken.size());
     }
   } while (leave_out_worst(problem, *solution, options.wrong_frame));

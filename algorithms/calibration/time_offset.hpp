@@ -69,7 +69,7 @@ struct TimeOffset {
 /// Gauss and Newton over the offset with the joint velocities as derivative; hand-eye, board, depth camera and a
 /// deviation of the arm in each motion are solved for beside it, believed as their covariances say.
 /// @return kTooFewViews for too few frames, kDegenerateMotion when the arm moved too slowly to tell, kClockWrong when
-/// the offset lies beyond the range, kSolveFailed when the frames contradict every offset
+/// the offset lies beyond the range or the frames contradict every offset, kSolveFailed when they scatter too much
 [[nodiscard]] Result<TimeOffset> estimate_time_offset(const TimedCell& cell, std::span<const MovingFrame> frames,
                                                       const TimeOffsetOptions& options = {});
 

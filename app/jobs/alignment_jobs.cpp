@@ -177,6 +177,7 @@ void Workbench::align_stamps() {
   const auto align = [&](std::span<const MovingFrame> frames, StampRecord& record) {
     const auto offset = estimate_time_offset(cell, frames);
     if (!offset) {
+      record.contradicted = offset.error().fault == Fault::kClockWrong;
       record.reason = offset.error().detail();
       return;
     }

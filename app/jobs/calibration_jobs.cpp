@@ -187,6 +187,7 @@ SolveResult Workbench::solve() {
     result.depth_moved_mrad = 1000 * depth->moved.tail<3>().norm();
   }
   result.offsets = stamp_offsets();
+  result.stamps_wrong = alignment_.color_stamps.contradicted || alignment_.depth_stamps.contradicted;
   return result;
 }
 

@@ -187,8 +187,8 @@ struct JointsAtTime {
 struct WayArguments {
   hal::Frame color, depth;
   bool has_depth = false;
-  std::uint32_t motion = 0;  ///< counts the motions
-  FixedVector<JointsAtTime, 40> joints;
+  std::uint32_t motion = 0;              ///< counts the motions
+  FixedVector<JointsAtTime, 64> joints;  ///< 0.96 s: both windows when the stamps are off by 0.2 s in opposite ways
   template <typename Archive>
   void fields(Archive& a) {
     a(color.stamp, color.sequence, color.slot, depth.stamp, depth.sequence, depth.slot, has_depth, motion, joints);
@@ -242,10 +242,11 @@ struct SolveResult {
   double depth_moved_mm = 0;     ///< from where it was said to be
   double depth_moved_mrad = 0;
   StampOffsets offsets;
+  bool stamps_wrong = false;  ///< frames on the way fit no offset that is looked for
   template <typename Archive>
   void fields(Archive& a) {
     a(solved, fault, translation_m, quaternion_xyzw, sigma_mm, sigma_mrad, reprojection_rms_px, depth_estimated,
-      depth_moved_mm, depth_moved_mrad, offsets);
+      depth_moved_mm, depth_moved_mrad, offsets, stamps_wrong);
   }
 };
 

@@ -248,6 +248,7 @@ struct StampRecord {
   double offset_s = 0;
   double sigma_s = 0;
   std::optional<TimeOffset> estimate;
+  bool contradicted = false;  ///< frames on the way fit no offset that is looked for
 };
 
 /// How the sensors stand to each other in space and time.

@@ -148,6 +148,10 @@ TEST_CASE("a depth camera that sits elsewhere and stamps that are off are found,
   CHECK(result["time_offset"]["color"]["offset_s"].get<double>() == Approx(0.02).margin(1e-3));
   CHECK(result["time_offset"]["depth"]["offset_s"].get<double>() == Approx(-0.04).margin(2e-3));
 
+  const Json apart = run_with("color.clock=0.15,depth.clock=-0.15", kDone);
+  CHECK(apart["time_offset"]["color"]["offset_s"].get<double>() == Approx(-0.15).margin(1e-3));
+  CHECK(apart["time_offset"]["depth"]["offset_s"].get<double>() == Approx(0.15).margin(2e-3));
+
   const Json bent = run_with("depth.tilt=40", kDone);
   CHECK(bent["depth_camera"]["estimate"]["stated"]["contradicted"] == true);
   CHECK(bent["truth"]["depth_camera_error_mrad"] < 2);
@@ -175,7 +179,8 @@ TEST_CASE("cameras that were never there, or stop, or hang, or have a wrong cloc
   run_with("color.stall_at=0", missing);
   run_with("depth.stall_at=0", missing);
   run_with("color.stall_at=20", stopped("E5003"));
-  run_with("color.clock=0.2", stopped("E5010"));
+  run_with("color.clock=0.25", stopped("E5010"));
+  run_with("depth.clock=-0.3", stopped("E5010"));
   run_with("depth.clock=-5", stopped("E5010"));
 }
 

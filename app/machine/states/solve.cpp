@@ -10,7 +10,9 @@ void enter_solve(Machine& m) {
 
 Handled on_solve(Machine& m, const MachineEvent& event) {
   if (const auto result = m.result_of<SolveResult>(JobKind::kSolve, event)) {
-    if (result->solved) {
+    if (result->solved && result->stamps_wrong) {
+      m.stop_for(Fault::kClockWrong);  // where a frame is taken to be from decides what counts as seen to be free
+    } else if (result->solved) {
       m.show("hand-eye sigma {:.2f} mm, {:.2f} mrad; reprojection {:.2f} px", result->sigma_mm, result->sigma_mrad,
              result->reprojection_rms_px);
       if (result->depth_estimated) {
