@@ -76,7 +76,7 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.arm.model = cell.arm_model;
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
-  set_board(cell.board, config.board);
+  set_targets(cell.boards, config);
   config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
@@ -228,10 +228,10 @@ int run_job(const RunCommand& command) {
       command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
   if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
 
-  std::optional<BoardSpec> board;  // load_config has refused what is no board
-  if (names_a_board(config.board)) board = board_of(config.board).value();
+  std::vector<NamedTarget> boards;  // load_config has refused what is no board
+  if (names_boards(config)) boards = targets_of(config).value();
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, board});
+                                        command.faults, config.workers, boards});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);

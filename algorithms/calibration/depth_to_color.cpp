@@ -52,9 +52,9 @@ std::optional<Term> term_of(const DepthStop& stop, const State& state) {
 }
 
 /// The errors that PlaneExcess is about: offset along the board's normal, tilts about its x and y through its middle.
-Eigen::Matrix3d by_excess(const Term& term, const DepthStop& stop, const BoardSpec& board) {
+Eigen::Matrix3d by_excess(const Term& term, const DepthStop& stop) {
   const Eigen::Matrix3d axes = stop.camera_T_board.rotation();
-  const Eigen::Vector3d lever = -axes * board.center();  // from the middle to the origin
+  const Eigen::Vector3d lever = -axes * stop.middle;  // from the middle to the origin
   Eigen::Matrix<double, 6, 3> errors = Eigen::Matrix<double, 6, 3>::Zero();
   errors.col(0).head<3>() = axes.col(2);
   for (int k = 0; k < 2; ++k) errors.col(1 + k) << axes.col(k).cross(lever), axes.col(k);
@@ -129,9 +129,8 @@ struct Noise {
 };
 
 /// What the residual of a stop may be: noise of its pixels, of its corners, and the excess.
-std::optional<Eigen::Matrix3d> information_of(const DepthStop& stop, const Term& term, const Noise& noise,
-                                              const BoardSpec& board) {
-  const Eigen::Matrix3d extra = by_excess(term, stop, board);
+std::optional<Eigen::Matrix3d> information_of(const DepthStop& stop, const Term& term, const Noise& noise) {
+  const Eigen::Matrix3d extra = by_excess(term, stop);
   const Eigen::Matrix3d covariance = noise.inverse_depth * noise.inverse_depth * stop.plane.unit_information.inverse() +
                                      term.by_board * stop.covariance * term.by_board.transpose() +
                                      extra * variances_of(noise.excess).asDiagonal() * extra.transpose();
@@ -152,13 +151,13 @@ double pooled_noise(std::span<const DepthStop> stops) {
 
 /// The estimate from the stops that `used` says, weights and estimate in turn.
 std::optional<State> solved(std::span<const DepthStop> stops, std::span<const DepthStopFit> fits, const Noise& noise,
-                            const BoardSpec& board, Problem& problem, State state) {
+                            Problem& problem, State state) {
   for (int round = 0; round < kWeightingRounds; ++round) {
     problem.stops.clear();
     for (std::size_t i = 0; i < stops.size(); ++i) {
       if (!fits[i].used) continue;
       const auto term = term_of(stops[i], state);
-      const auto information = term ? information_of(stops[i], *term, noise, board) : std::nullopt;
+      const auto information = term ? information_of(stops[i], *term, noise) : std::nullopt;
       if (!information) return std::nullopt;
       problem.stops.push_back({&stops[i], *information});
     }
@@ -169,16 +168,15 @@ std::optional<State> solved(std::span<const DepthStop> stops, std::span<const De
   return state;
 }
 
-bool judge(std::span<const DepthStop> stops, const State& state, const Noise& noise, const BoardSpec& board,
-           std::vector<DepthStopFit>& fits) {
+bool judge(std::span<const DepthStop> stops, const State& state, const Noise& noise, std::vector<DepthStopFit>& fits) {
   for (std::size_t i = 0; i < stops.size(); ++i) {
     const auto term = term_of(stops[i], state);
-    const auto information = term ? information_of(stops[i], *term, noise, board) : std::nullopt;
+    const auto information = term ? information_of(stops[i], *term, noise) : std::nullopt;
     if (!information) return false;
     fits[i].chi2 = term->residual.dot(*information * term->residual);
     const Eigen::Vector3d measured = stops[i].plane.inverse_depth, expected = measured - term->residual;
     const Eigen::Vector3d middle =
-        state.camera_T_depth.inverse(Eigen::Isometry) * (stops[i].camera_T_board * board.center());
+        state.camera_T_depth.inverse(Eigen::Isometry) * (stops[i].camera_T_board * stops[i].middle);
     const Eigen::Vector3d ray = middle / middle.z();
     fits[i].offset_m = 1 / measured.dot(ray) - 1 / expected.dot(ray);
     fits[i].tilt_rad = std::atan2(measured.cross(expected).norm(), measured.dot(expected));
@@ -188,16 +186,16 @@ bool judge(std::span<const DepthStop> stops, const State& state, const Noise& no
 
 /// One step of expectation maximisation: the errors of each stop given its residual, and their mean squares.
 PlaneExcess better_excess(std::span<const DepthStop> stops, std::span<const DepthStopFit> fits, const State& state,
-                          const Noise& noise, const BoardSpec& board) {
+                          const Noise& noise) {
   const Eigen::Vector3d before = variances_of(noise.excess);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0;
   for (std::size_t i = 0; i < stops.size(); ++i) {
     if (!fits[i].used) continue;
     const auto term = term_of(stops[i], state);
-    const auto information = term ? information_of(stops[i], *term, noise, board) : std::nullopt;
+    const auto information = term ? information_of(stops[i], *term, noise) : std::nullopt;
     if (!information) continue;
-    const Eigen::Matrix3d extra = by_excess(*term, stops[i], board);
+    const Eigen::Matrix3d extra = by_excess(*term, stops[i]);
     const Eigen::Matrix3d gain = before.asDiagonal() * extra.transpose() * *information;
     const Eigen::Matrix3d covariance = Eigen::Matrix3d(before.asDiagonal()) - gain * extra * before.asDiagonal();
     sum += (gain * term->residual).cwiseAbs2() + covariance.diagonal();
@@ -303,7 +301,7 @@ Status check_input(std::span<const DepthStop> stops, const DepthMount& believed,
   }
   for (std::size_t i = 0; i < stops.size(); ++i) {
     const DepthStop& stop = stops[i];
-    if (!stop.camera_T_board.pose().matrix().allFinite() || !stop.covariance.allFinite() ||
+    if (!stop.camera_T_board.pose().matrix().allFinite() || !stop.covariance.allFinite() || !stop.middle.allFinite() ||
         !stop.plane.inverse_depth.allFinite() || !(stop.plane.noise > 0) || stop.plane.pixels <= 0) {
       return failure(Fault::kSolveFailed, "stop {}: board pose or depth plane is not finite", i + 1);
     }
@@ -314,7 +312,6 @@ Status check_input(std::span<const DepthStop> stops, const DepthMount& believed,
 /// The least squares with its stops judged. What of the stops is used stands in `fits`.
 struct Solver {
   std::span<const DepthStop> stops;
-  const BoardSpec& board;
   const DepthToColorOptions& options;
   Problem problem{};
   Noise noise{};
@@ -337,8 +334,8 @@ struct Solver {
   }
 
   [[nodiscard]] Status solve() {
-    const auto next = solved(stops, fits, noise, board, problem, state);
-    if (!next || !judge(stops, *next, noise, board, fits)) {
+    const auto next = solved(stops, fits, noise, problem, state);
+    if (!next || !judge(stops, *next, noise, fits)) {
       return failure(Fault::kSolveFailed, "no pose of the depth camera puts the board's planes before it");
     }
     state = *next;
@@ -366,7 +363,7 @@ struct Solver {
     constexpr int kRounds = 40;
     noise.excess = {1e-3, 2e-3};
     for (int round = 0; round < kRounds; ++round) {
-      noise.excess = better_excess(stops, fits, state, noise, board);
+      noise.excess = better_excess(stops, fits, state, noise);
       if (Status status = solve(); !status) return status;
     }
     // Offsets fitted translation and scale, tilts the rotation: that share of them is missing in their squares.
@@ -395,10 +392,10 @@ DepthMount believed_mount(const Transform<Camera, Depth>& camera_T_depth, double
 }
 
 Result<DepthToColor> estimate_depth_to_color(std::span<const DepthStop> stops, const DepthMount& believed,
-                                             const BoardSpec& board, const DepthToColorOptions& options) {
+                                             const DepthToColorOptions& options) {
   if (Status status = check_input(stops, believed, options); !status) return std::unexpected(status.error());
   const State before{believed.camera_T_depth.pose(), believed.depth_scale};
-  Solver solver{.stops = stops, .board = board, .options = options};
+  Solver solver{.stops = stops, .options = options};
   solver.problem.believed = before;
   solver.problem.belief = believed.covariance.inverse();
   solver.noise.inverse_depth = pooled_noise(stops);

@@ -32,6 +32,7 @@ struct DepthStop {
   Transform<Camera, Board> camera_T_board;
   Matrix6d covariance = Matrix6d::Zero();  ///< of its pose_difference
   BoardPlane plane;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< BoardSpec::center of the board that it shows
 };
 
 struct DepthToColorOptions {
@@ -94,7 +95,6 @@ struct DepthToColor {
 /// @return kTooFewViews for less than stops_min stops, kSolveFailed when the stops contradict each other or numbers are
 /// not finite
 [[nodiscard]] Result<DepthToColor> estimate_depth_to_color(std::span<const DepthStop> stops, const DepthMount& believed,
-                                                           const BoardSpec& board,
                                                            const DepthToColorOptions& options = {});
 
 }  // namespace firstlook

@@ -21,12 +21,15 @@ struct SeenView {
   BoardPose pose;
 };
 
-/// Where one view puts the board, and how errors move it: pose_difference of base_T_board by those of the hand-eye
-/// transform, and the covariance that the view has for itself (arm and corners).
+/// Where one view puts its board, and how errors move it: pose_difference of base_T_board by those of the hand-eye
+/// transform and of the arm, and the covariance that the corners have.
 struct BoardReading {
+  int target = 0;
+  int station = -1;  ///< as in CalibrationView
   Pose base_T_board = Pose::Identity();
   Matrix6d by_hand_eye = Matrix6d::Zero();
-  Matrix6d own_covariance = Matrix6d::Zero();
+  Matrix6d by_arm = Matrix6d::Zero();
+  Matrix6d corner_covariance = Matrix6d::Zero();
 };
 
 /// d(R p + t) for a turn of R by d: d x (R p), so the derivative by d is -[R p]x.
@@ -43,59 +46,79 @@ BoardReading read_board(const SeenView& seen, const HandEyeClaim& claim) {
   const Pose camera = claim.flange_T_camera.pose();
   const Pose board = seen.pose.camera_T_board.pose();
   BoardReading reading;
+  reading.target = seen.view->target;
+  reading.station = seen.view->station;
   reading.base_T_board = flange * camera * board;
   reading.by_hand_eye = moved_by(flange.linear(), camera.linear() * board.translation());
-  const Matrix6d by_arm =
-      moved_by(Eigen::Matrix3d::Identity(), reading.base_T_board.translation() - flange.translation());
+  reading.by_arm = moved_by(Eigen::Matrix3d::Identity(), reading.base_T_board.translation() - flange.translation());
   const Matrix6d by_camera = moved_by(flange.linear() * camera.linear(), Eigen::Vector3d::Zero());
-  Vector6d arm_variance;
-  arm_variance << Eigen::Vector3d::Constant(claim.arm_sigma.translation_m * claim.arm_sigma.translation_m),
-      Eigen::Vector3d::Constant(claim.arm_sigma.rotation_rad * claim.arm_sigma.rotation_rad);
-  reading.own_covariance =
-      by_arm * arm_variance.asDiagonal() * by_arm.transpose() +
+  reading.corner_covariance =
       claim.corner_sigma_px * claim.corner_sigma_px * by_camera * seen.pose.unit_covariance * by_camera.transpose();
   return reading;
 }
 
-/// Inverse of the covariance of all readings together: the calibration's error is common to them.
-Eigen::MatrixXd joint_information(const std::vector<BoardReading>& readings, const Matrix6d& claim_covariance) {
+/// Inverse of the covariance of all readings together: the calibration's error is common to them, the arm's deviation
+/// to those from one place of it.
+Eigen::MatrixXd joint_information(const std::vector<BoardReading>& readings, const HandEyeClaim& claim) {
+  Vector6d arm_variance;
+  arm_variance << Eigen::Vector3d::Constant(claim.arm_sigma.translation_m * claim.arm_sigma.translation_m),
+      Eigen::Vector3d::Constant(claim.arm_sigma.rotation_rad * claim.arm_sigma.rotation_rad);
   const auto n = static_cast<Eigen::Index>(readings.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(6 * n, 6 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const BoardReading& a = readings[static_cast<std::size_t>(i)];
-    covariance.block<6, 6>(6 * i, 6 * i) += a.own_covariance;
+    covariance.block<6, 6>(6 * i, 6 * i) += a.corner_covariance;
     for (Eigen::Index j = 0; j < n; ++j) {
       const BoardReading& b = readings[static_cast<std::size_t>(j)];
-      covariance.block<6, 6>(6 * i, 6 * j) += a.by_hand_eye * claim_covariance * b.by_hand_eye.transpose();
+      covariance.block<6, 6>(6 * i, 6 * j) += a.by_hand_eye * claim.covariance * b.by_hand_eye.transpose();
+      if (i != j && (a.station < 0 || a.station != b.station)) continue;
+      covariance.block<6, 6>(6 * i, 6 * j) += a.by_arm * arm_variance.asDiagonal() * b.by_arm.transpose();
     }
   }
   return covariance.ldlt().solve(Eigen::MatrixXd::Identity(6 * n, 6 * n));
 }
 
-struct CommonBoard {
-  Pose base_T_board = Pose::Identity();
-  Matrix6d covariance = Matrix6d::Zero();
+/// The boards behind the readings.
+struct CommonBoards {
+  std::vector<int> targets;  ///< those that were read, in the order in which they appear
+  std::vector<Pose> base_T_board;
+  Eigen::MatrixXd covariance;  ///< of all of them
   double chi2 = 0;
 };
 
-/// Generalised least squares for the one board behind all readings; three steps reach rounding for what passes.
-CommonBoard fit_board(const std::vector<BoardReading>& readings, const Eigen::MatrixXd& information) {
+/// Generalised least squares for the boards behind all readings; three steps reach rounding for what passes.
+CommonBoards fit_boards(const std::vector<BoardReading>& readings, const Eigen::MatrixXd& information) {
   const auto n = static_cast<Eigen::Index>(readings.size());
-  const Eigen::MatrixXd design = Matrix6d::Identity().replicate(n, 1);
-  CommonBoard common;
-  common.base_T_board = readings.front().base_T_board;
-  common.covariance = Matrix6d(design.transpose() * information * design).ldlt().solve(Matrix6d::Identity());
+  CommonBoards common;
+  std::vector<std::size_t> board;  // of each reading
+  for (const BoardReading& reading : readings) {
+    const auto known = std::find(common.targets.begin(), common.targets.end(), reading.target);
+    board.push_back(static_cast<std::size_t>(known - common.targets.begin()));
+    if (known != common.targets.end()) continue;
+    common.targets.push_back(reading.target);
+    common.base_T_board.push_back(reading.base_T_board);
+  }
+  const auto boards = static_cast<Eigen::Index>(common.targets.size());
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(6 * n, 6 * boards);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    design.block<6, 6>(6 * i, 6 * static_cast<Eigen::Index>(board[static_cast<std::size_t>(i)])).setIdentity();
+  }
+  common.covariance = Eigen::MatrixXd(design.transpose() * information * design)
+                          .ldlt()
+                          .solve(Eigen::MatrixXd::Identity(6 * boards, 6 * boards));
   const auto differences = [&] {
     Eigen::VectorXd d(6 * n);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const Pose& read = readings[static_cast<std::size_t>(i)].base_T_board;
-      d.segment<6>(6 * i) = pose_difference(read, common.base_T_board);
+      const auto at = static_cast<std::size_t>(i);
+      d.segment<6>(6 * i) = pose_difference(readings[at].base_T_board, common.base_T_board[board[at]]);
     }
     return d;
   };
   for (int step = 0; step < 3; ++step) {
-    const Vector6d move = common.covariance * (design.transpose() * (information * differences()));
-    common.base_T_board = perturb(common.base_T_board, move);
+    const Eigen::VectorXd move = common.covariance * (design.transpose() * (information * differences()));
+    for (std::size_t k = 0; k < common.base_T_board.size(); ++k) {
+      common.base_T_board[k] = perturb(common.base_T_board[k], move.segment<6>(6 * static_cast<Eigen::Index>(k)));
+    }
   }
   const Eigen::VectorXd rest = differences();
   common.chi2 = rest.dot(information * rest);
@@ -113,24 +136,53 @@ double shown_corner_sigma(std::span<const SeenView> seen) {
   return std::sqrt(squared_px / static_cast<double>(seen.size()) * coordinates / (coordinates - 6));
 }
 
-Matrix6d covariance_by_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const SeenView> seen,
-                             const HandEyeClaim& claim, const Transform<Base, Board>& base_T_board) {
-  const ViewDesignModel model{camera,         board, claim.flange_T_camera, base_T_board, claim.corner_sigma_px,
-                              claim.arm_sigma};
-  Matrix12d information = prior_information();
-  for (const SeenView& s : seen) information += view_information(model, s.view->base_T_flange);
-  return predicted_covariance(information);
+/// The places of the arm, each with its views.
+std::vector<std::vector<const SeenView*>> by_station(std::span<const SeenView> seen) {
+  std::vector<std::vector<const SeenView*>> stations;
+  for (const SeenView& s : seen) {
+    const auto same = [&](const auto& station) {
+      return s.view->station >= 0 && station.front()->view->station == s.view->station;
+    };
+    const auto known = std::find_if(stations.begin(), stations.end(), same);
+    if (known == stations.end()) {
+      stations.push_back({&s});
+    } else {
+      known->push_back(&s);
+    }
+  }
+  return stations;
 }
 
-void measure_views(const CameraIntrinsics& camera, const BoardSpec& board, std::span<const SeenView> seen,
+Matrix6d covariance_by_views(const CameraIntrinsics& camera, const Targets& targets, std::span<const SeenView> seen,
+                             const HandEyeClaim& claim, const CommonBoards& common) {
+  std::vector<ViewDesignModel> models;
+  for (std::size_t k = 0; k < common.targets.size(); ++k) {
+    models.push_back({camera, targets[common.targets[k]], claim.flange_T_camera,
+                      Transform<Base, Board>(common.base_T_board[k]), claim.corner_sigma_px, claim.arm_sigma});
+  }
+  Eigen::MatrixXd information = joint_prior_information(models.size());
+  for (const auto& station : by_station(seen)) {
+    std::uint32_t shown = 0;
+    for (const SeenView* s : station) {
+      const auto k = std::find(common.targets.begin(), common.targets.end(), s->view->target) - common.targets.begin();
+      shown |= 1U << k;
+    }
+    information += joint_view_information(models, shown, station.front()->view->base_T_flange);
+  }
+  return predicted_hand_eye(information);
+}
+
+void measure_views(const CameraIntrinsics& camera, const Targets& targets, std::span<const SeenView> seen,
                    const HandEyeClaim& claim, Verification& result) {
   double squared_px = 0, squared_m = 0;
   for (const SeenView& s : seen) {
     const auto read = s.view->base_T_flange * claim.flange_T_camera * s.pose.camera_T_board;
+    const BoardSpec& board = targets[s.view->target];
+    const auto& base_T_board = result.targets[static_cast<std::size_t>(s.view->target)].base_T_board;
     VerifiedView view;
-    view.residual_rms_px = reprojection_rms(camera, board, {s.view, 1}, claim.flange_T_camera, result.base_T_board);
-    view.board_shift_m = (read * board.center() - result.base_T_board * board.center()).norm();
-    view.board_turn_rad = rotation_log(read.rotation() * result.base_T_board.rotation().transpose()).norm();
+    view.residual_rms_px = reprojection_rms(camera, board, {s.view, 1}, claim.flange_T_camera, base_T_board);
+    view.board_shift_m = (read * board.center() - base_T_board * board.center()).norm();
+    view.board_turn_rad = rotation_log(read.rotation() * base_T_board.rotation().transpose()).norm();
     squared_px += view.residual_rms_px * view.residual_rms_px;
     squared_m += view.board_shift_m * view.board_shift_m;
     result.views.push_back(view);
@@ -172,19 +224,22 @@ double largest_deviation(const Eigen::Matrix3d& covariance) {
 }
 
 /// The views that show a board, each with the one of its poses that agrees with the others.
-std::vector<SeenView> settled_views(const CameraIntrinsics& camera, const BoardSpec& board,
+std::vector<SeenView> settled_views(const CameraIntrinsics& camera, const Targets& targets,
                                     std::span<const CalibrationView> views,
                                     const Transform<Flange, Camera>& flange_T_camera) {
   std::vector<SeenView> seen;
   std::vector<OpenView> open;
   for (const CalibrationView& view : views) {
-    const auto pose = estimate_board_pose_robust(camera, board, view.points());
+    if (!targets.has(view.target)) continue;
+    const auto pose = estimate_board_pose_robust(camera, targets[view.target], view.points());
     if (!pose) continue;
     seen.push_back({&view, pose->pose});
     open.push_back(seen_one_way(view, pose->pose));
   }
   const auto choices = settle_choices(open, flange_T_camera);
-  for (std::size_t i = 0; i < seen.size(); ++i) adopt_choice(board, open[i].choices[choices[i]], seen[i].pose);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    adopt_choice(targets[seen[i].view->target], open[i].choices[choices[i]], seen[i].pose);
+  }
   return seen;
 }
 
@@ -200,11 +255,11 @@ DetectableError detectable_error(const Matrix6d& views_covariance, const Matrix6
   return {root * largest_deviation(sum.topLeftCorner<3, 3>()), root * largest_deviation(sum.bottomRightCorner<3, 3>())};
 }
 
-Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                      std::span<const CalibrationView> views, const HandEyeClaim& stated,
                                      const VerificationLimits& limits) {
-  const std::vector<SeenView> seen = settled_views(camera, board, views, stated.flange_T_camera);
-  const auto count = static_cast<int>(seen.size());
+  const std::vector<SeenView> seen = settled_views(camera, targets, views, stated.flange_T_camera);
+  const auto count = static_cast<int>(by_station(seen).size());
   if (count < std::max(2, limits.views_min)) {
     return failure(Fault::kTooFewViews, "{} usable views of the board, {} are the least", count, limits.views_min);
   }
@@ -212,21 +267,33 @@ Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const Board
   claim.corner_sigma_px = std::max(stated.corner_sigma_px, shown_corner_sigma(seen));
   std::vector<BoardReading> readings;
   for (const SeenView& s : seen) readings.push_back(read_board(s, claim));
-  const CommonBoard common = fit_board(readings, joint_information(readings, claim.covariance));
+  const CommonBoards common = fit_boards(readings, joint_information(readings, claim));
+  // What the views leave, as so many views of one target would.
+  const auto alike = static_cast<int>(readings.size() + 1 - common.targets.size());
+  if (alike < 2) return failure(Fault::kTooFewViews, "each target was seen once: two views of one are the least");
 
   Verification result;
   result.corner_sigma_px = claim.corner_sigma_px;
   result.chi2 = common.chi2;
-  result.degrees_of_freedom = 6 * (count - 1);
+  result.degrees_of_freedom = 6 * (alike - 1);
   result.chi2_limit = chi_square_quantile(1 - limits.significance, result.degrees_of_freedom);
-  result.base_T_board = Transform<Base, Board>(common.base_T_board);
-  result.board_covariance = common.covariance;
-  if (!std::isfinite(result.chi2) || !common.covariance.allFinite() || !common.base_T_board.matrix().allFinite()) {
+  result.targets.resize(static_cast<std::size_t>(targets.size()));
+  bool finite = std::isfinite(result.chi2) && common.covariance.allFinite();
+  for (std::size_t k = 0; k < common.targets.size(); ++k) {
+    const auto at = 6 * static_cast<Eigen::Index>(k);
+    TargetPose& target = result.targets[static_cast<std::size_t>(common.targets[k])];
+    target.views = static_cast<int>(
+        std::ranges::count_if(seen, [&](const SeenView& s) { return s.view->target == common.targets[k]; }));
+    target.base_T_board = Transform<Base, Board>(common.base_T_board[k]);
+    target.covariance = common.covariance.block<6, 6>(at, at);
+    finite = finite && common.base_T_board[k].matrix().allFinite();
+  }
+  if (!finite) {
     return failure(Fault::kSolveFailed, "poses, corners or covariance are not finite");
   }
-  result.detectable = detectable_error(covariance_by_views(camera, board, seen, claim, result.base_T_board),
-                                       claim.covariance, count, limits);
-  measure_views(camera, board, seen, claim, result);
+  result.detectable =
+      detectable_error(covariance_by_views(camera, targets, seen, claim, common), claim.covariance, alike, limits);
+  measure_views(camera, targets, seen, claim, result);
   judge(limits, result);
   return result;
 }

@@ -7,7 +7,7 @@
 
 #include "algorithms/calibration/calibration_view.hpp"
 #include "algorithms/calibration/hand_eye_refinement.hpp"
-#include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target_set.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
 
@@ -38,6 +38,7 @@ struct DetectableError {
   }
 };
 
+/// @param views  of one target; of several as many as leave the same degrees of freedom: one less for each further one
 /// @param views_covariance what `views` views alone would tell of flange_T_camera: predicted_covariance of their
 /// view_information
 /// @param claim_covariance that of the calibration to be tested
@@ -62,20 +63,19 @@ struct Verification {
   double residual_rms_px = 0;  ///< over all views, for each coordinate
   double residual_rms_m = 0;   ///< of the board's centre
   std::vector<VerifiedView> views;
-  Transform<Base, Board> base_T_board;  ///< by all views
-  Matrix6d board_covariance = Matrix6d::Zero();
+  std::vector<TargetPose> targets;  ///< by all views, one for each target given
 };
 
-/// Chi-square test of the hypothesis that the board stands still in base: each view puts it at
+/// Chi-square test of the hypothesis that each board stands still in base: each view puts it at
 /// base_T_flange * flange_T_camera * camera_T_board, and these must agree within the covariance of the calibration
-/// (one error, common to all views), the corner noise and the arm's deviation (of each view by itself). The board's
-/// pose is free, so `n` views leave 6 (n - 1) degrees of freedom. A calibration also fails when the views are too much
-/// alike to find an error of the sizes in `limits`: agreement of views that could not disagree says nothing.
-/// What no views of one board can show: an error of the flange frame itself, or of base
-/// (algorithms/calibration/README).
-/// @return kTooFewViews below `limits.views_min`, or when the board is not found in enough of them; kSolveFailed for
-/// numbers that are not finite
-[[nodiscard]] Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const BoardSpec& board,
+/// (one error, common to all views), the corner noise and the arm's deviation (of each place by itself). The boards'
+/// poses are free, so `n` views of `k` targets leave 6 (n - k) degrees of freedom; a target's only view says nothing. A
+/// calibration also fails when the views are too much alike to find an error of the sizes in `limits`: agreement of
+/// views that could not disagree says nothing. What no views of one board can show: an error of the flange frame
+/// itself, or of base (algorithms/calibration/README).
+/// @return kTooFewViews below `limits.views_min` places of the arm, or when boards are not found at enough of them;
+/// kSolveFailed for numbers that are not finite
+[[nodiscard]] Result<Verification> verify_hand_eye(const CameraIntrinsics& camera, const Targets& targets,
                                                    std::span<const CalibrationView> views, const HandEyeClaim& stated,
                                                    const VerificationLimits& limits = {});
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "algorithms/vision/camera_model.hpp"
 
@@ -24,6 +25,26 @@ double smallest_spacing_px(const ViewDesignModel& model, const Transform<Camera,
   return smallest / model.board.detail_ratio();
 }
 
+/// Of a view before the arm's deviation is marginalised; empty when a corner lies behind the camera.
+std::optional<ViewNormal> view_normal(const ViewDesignModel& model, const Transform<Base, Flange>& base_T_flange) {
+  const ViewGeometry geometry{model.flange_T_camera.pose(), model.base_T_board.pose(), base_T_flange.pose()};
+  const double weight = 1 / (model.corner_sigma_px * model.corner_sigma_px);
+  ViewNormal normal;
+  for (int i = 0; i < model.board.corners(); ++i) {
+    const auto term = corner_term(model.camera, geometry, model.board.corner(i));
+    if (!term) return std::nullopt;
+    normal.add(*term, Eigen::Vector2d::Zero(), weight);
+  }
+  return normal;
+}
+
+void believe_arm(const ArmSigma& sigma, Matrix6d& arm) {
+  arm.diagonal().head<3>().array() += std::pow(sigma.translation_m, -2);
+  arm.diagonal().tail<3>().array() += std::pow(sigma.rotation_rad, -2);
+}
+
+bool is_shown(std::uint32_t shown, std::size_t target) { return (shown >> target & 1U) != 0; }
+
 }  // namespace
 
 ViewFault check_view(const ViewDesignModel& model, const Transform<Base, Flange>& base_T_flange,
@@ -41,17 +62,54 @@ ViewFault check_view(const ViewDesignModel& model, const Transform<Base, Flange>
 }
 
 Matrix12d view_information(const ViewDesignModel& model, const Transform<Base, Flange>& base_T_flange) {
-  const ViewGeometry geometry{model.flange_T_camera.pose(), model.base_T_board.pose(), base_T_flange.pose()};
-  const double weight = 1 / (model.corner_sigma_px * model.corner_sigma_px);
-  ViewNormal normal;
-  for (int i = 0; i < model.board.corners(); ++i) {
-    const auto term = corner_term(model.camera, geometry, model.board.corner(i));
-    if (!term) return Matrix12d::Zero();
-    normal.add(*term, Eigen::Vector2d::Zero(), weight);
+  auto normal = view_normal(model, base_T_flange);
+  if (!normal) return Matrix12d::Zero();
+  believe_arm(model.arm_sigma, normal->arm);
+  return normal->global - normal->global_arm * normal->arm.llt().solve(normal->global_arm.transpose());
+}
+
+Eigen::MatrixXd joint_view_information(std::span<const ViewDesignModel> models, std::uint32_t shown,
+                                       const Transform<Base, Flange>& base_T_flange) {
+  if (models.size() == 1 && is_shown(shown, 0)) return view_information(models.front(), base_T_flange);
+  const auto size = static_cast<Eigen::Index>(6 + 6 * models.size());
+  Eigen::MatrixXd global = Eigen::MatrixXd::Zero(size, size), global_arm = Eigen::MatrixXd::Zero(size, 6);
+  Matrix6d arm = Matrix6d::Zero();
+  for (std::size_t k = 0; k < models.size(); ++k) {
+    if (!is_shown(shown, k)) continue;
+    const auto normal = view_normal(models[k], base_T_flange);
+    if (!normal) continue;
+    const auto at = static_cast<Eigen::Index>(6 + 6 * k);
+    global.topLeftCorner<6, 6>() += normal->global.topLeftCorner<6, 6>();
+    global.block<6, 6>(0, at) += normal->global.topRightCorner<6, 6>();
+    global.block<6, 6>(at, 0) += normal->global.bottomLeftCorner<6, 6>();
+    global.block<6, 6>(at, at) += normal->global.bottomRightCorner<6, 6>();
+    global_arm.topRows<6>() += normal->global_arm.topRows<6>();
+    global_arm.middleRows<6>(at) += normal->global_arm.bottomRows<6>();
+    arm += normal->arm;
   }
-  normal.arm.diagonal().head<3>().array() += std::pow(model.arm_sigma.translation_m, -2);
-  normal.arm.diagonal().tail<3>().array() += std::pow(model.arm_sigma.rotation_rad, -2);
-  return normal.global - normal.global_arm * normal.arm.llt().solve(normal.global_arm.transpose());
+  believe_arm(models.front().arm_sigma, arm);
+  return global - global_arm * arm.llt().solve(Eigen::MatrixXd(global_arm.transpose()));
+}
+
+Eigen::MatrixXd joint_prior_information(std::size_t targets) {
+  const Matrix12d one = prior_information();
+  const auto size = static_cast<Eigen::Index>(6 + 6 * targets);
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) prior(i, i) = one(i % 6, i % 6);  // the same for transform and board
+  return prior;
+}
+
+Eigen::MatrixXd predicted_joint(const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+  const Eigen::MatrixXd covariance = scale.asDiagonal() * inverse * scale.asDiagonal();
+  return (covariance + covariance.transpose()) / 2;
+}
+
+Matrix6d predicted_hand_eye(const Eigen::MatrixXd& information) {
+  if (information.rows() == 12) return predicted_covariance(information);
+  return predicted_joint(information).topLeftCorner<6, 6>();
 }
 
 Matrix12d prior_information() {

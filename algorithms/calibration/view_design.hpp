@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <span>
 
 #include "algorithms/calibration/hand_eye_refinement.hpp"
@@ -52,6 +53,16 @@ enum class ViewFault : std::uint8_t { kNone, kBehind, kOutOfImage, kTilt, kDista
 /// D-optimal cost of a covariance: the sixth root of its determinant, m rad. Unlike design_cost it tells views
 /// apart while some direction is still open: that direction's share is the same factor for all of them.
 [[nodiscard]] double design_volume(const Matrix6d& covariance);
+
+/// The same with several targets, each with a model of its own that shares camera, hand-eye and sigmas with the others:
+/// information about flange_T_camera (first six) and base_T_board of each model in their order, added by one place of
+/// the arm from which those of the bit mask `shown` are seen. What is seen from one place shares the arm's deviation.
+[[nodiscard]] Eigen::MatrixXd joint_view_information(std::span<const ViewDesignModel> models, std::uint32_t shown,
+                                                     const Transform<Base, Flange>& base_T_flange);
+[[nodiscard]] Eigen::MatrixXd joint_prior_information(std::size_t targets);
+/// Covariance of flange_T_camera; and of all that the information is about.
+[[nodiscard]] Matrix6d predicted_hand_eye(const Eigen::MatrixXd& information);
+[[nodiscard]] Eigen::MatrixXd predicted_joint(const Eigen::MatrixXd& information);
 
 /// design_cost after one more view at `candidate`: smaller is better. About 25 us.
 [[nodiscard]] double predicted_cost(const ViewDesignModel& model, const Matrix12d& information,

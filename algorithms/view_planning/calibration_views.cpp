@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "algorithms/kinematics/inverse_kinematics.hpp"
 #include "algorithms/kinematics/self_collision.hpp"
@@ -20,6 +21,7 @@ constexpr double kDegree_rad = std::numbers::pi / 180;
 
 struct Candidate {
   JointVector q;
+  std::uint32_t shown = 0;
   double cost = 0;
 };
 
@@ -37,6 +39,28 @@ struct Search {
 double cost_of(const Matrix6d& covariance, const CalibrationViewOptions& options) {
   return options.criterion == DesignCriterion::kVolume ? design_volume(covariance)
                                                        : design_cost(covariance, options.cost_lever_m);
+}
+
+/// What a view is chosen by: the transform's cost, or the sum of those of the poses of the targets that are wanted.
+double cost_of(const Eigen::MatrixXd& information, const CalibrationViewOptions& options) {
+  if (options.wanted == 0) return cost_of(predicted_hand_eye(information), options);
+  const Eigen::MatrixXd covariance = predicted_joint(information);
+  double cost = 0;
+  for (Eigen::Index at = 6, k = 0; at < covariance.rows(); at += 6, ++k) {
+    const bool wanted = (options.wanted >> k & 1U) != 0;
+    if (wanted) cost += design_cost(covariance.block<6, 6>(at, at), options.cost_lever_m);
+  }
+  return cost;
+}
+
+/// Bit mask of the targets that pass.
+template <typename Passes>
+std::uint32_t targets_that(std::span<const ViewDesignModel> models, Passes passes) {
+  std::uint32_t mask = 0;
+  for (std::size_t k = 0; k < models.size(); ++k) {
+    if (passes(k, models[k])) mask |= 1U << k;
+  }
+  return mask;
 }
 
 bool is_new(const Search& s, const JointVector& q) {
@@ -57,27 +81,40 @@ void keep_when_good(Search& s, const Candidate& candidate) {
   std::rotate(s.best.begin() + at, s.best.end() - 1, s.best.end());
 }
 
-/// Keeps q when it is new, sees the whole board, is free and does not hide the board: from cheap to dear.
+/// Keeps q when it is new, sees a whole board that serves, is free and does not hide it: from cheap to dear.
 void consider(Search& s, const JointVector& q) {
   ++s.considered;
   if (!is_new(s, q)) return;
   const CalibrationViewInputs& in = s.inputs;
   const LinkFrames frames = forward(in.arm, q);
-  if (check_view(in.model, frames.flange(), s.options.limits) != ViewFault::kNone) return;
+  const std::uint32_t useful = s.options.wanted == 0 ? ~0U : s.options.wanted;
+  const auto in_view = targets_that(in.models, [&](std::size_t, const ViewDesignModel& model) {
+    return check_view(model, frames.flange(), s.options.limits) == ViewFault::kNone;
+  });
+  if ((in_view & useful) == 0) return;
   if (!configuration_is_free(in.arm, in.body, in.space, in.clearance, q, kTargetMargin_m)) return;
-  if (hides_board(in.model, place(in.body.capsules, frames), frames.flange())) return;
-  const Matrix12d information = in.information + view_information(in.model, frames.flange());
+  const Capsules body = place(in.body.capsules, frames);
+  const auto shown = targets_that(in.models, [&](std::size_t k, const ViewDesignModel& model) {
+    return (in_view >> k & 1U) != 0 && !hides_board(model, body, frames.flange());
+  });
+  if ((shown & useful) == 0) return;
+  const Eigen::MatrixXd information = in.information + joint_view_information(in.models, shown, frames.flange());
   ++s.feasible;
-  keep_when_good(s, {q, cost_of(predicted_covariance(information), s.options)});
+  keep_when_good(s, {q, shown, cost_of(information, s.options)});
 }
 
 void draw_aimed(Search& s) {
   const CalibrationViewInputs& in = s.inputs;
   if (!has_closed_form_inverse(in.arm)) return;
-  const Transform<Camera, Flange> camera_T_flange = in.model.flange_T_camera.inverse();
-  const Eigen::Vector3d center = in.model.base_T_board * in.model.board.center();
-  const Eigen::Vector3d front = -in.model.base_T_board.rotation().col(2);  // the board's z points away from who sees it
+  std::vector<const ViewDesignModel*> aims;
+  for (std::size_t k = 0; k < in.models.size(); ++k) {
+    if (s.options.wanted == 0 || (s.options.wanted >> k & 1U) != 0) aims.push_back(&in.models[k]);
+  }
   for (int i = 0; i < s.options.aimed_draws; ++i) {
+    const ViewDesignModel& model = *aims[static_cast<std::size_t>(i) % aims.size()];
+    const Transform<Camera, Flange> camera_T_flange = model.flange_T_camera.inverse();
+    const Eigen::Vector3d center = model.base_T_board * model.board.center();
+    const Eigen::Vector3d front = -model.base_T_board.rotation().col(2);  // its z points away from who sees it
     const Eigen::Vector3d direction = direction_within(front, s.options.tilt_max_rad, s.random);
     const double distance_m = s.random.uniform(s.options.distance_min_m, s.options.distance_max_m);
     const double roll_rad = s.random.uniform(0, 2 * std::numbers::pi);
@@ -161,9 +198,9 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
   CalibrationViewChoice choice;
   choice.considered = s.considered;
   choice.feasible = s.feasible;
-  choice.before = predicted_covariance(inputs.information);
+  choice.before = predicted_hand_eye(inputs.information);
   choice.after = choice.before;
-  const double cost_max = cost_of(choice.before, options) * (1 - options.cost_drop_min);
+  const double cost_max = cost_of(inputs.information, options) * (1 - options.cost_drop_min);
   int plans = 0;
   for (const Candidate& candidate : s.best) {
     if (candidate.cost > cost_max) {
@@ -173,11 +210,13 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
     if (++plans > options.plans_max) break;
     const Result<Path> path = planner.plan_to(candidate.q);
     if (!path) continue;
-    const Matrix12d added = view_information(inputs.model, forward(inputs.arm, candidate.q).flange());
+    const Eigen::MatrixXd added =
+        joint_view_information(inputs.models, candidate.shown, forward(inputs.arm, candidate.q).flange());
     choice.outcome = CalibrationViewChoice::Outcome::kChosen;
     choice.target = candidate.q;
+    choice.shown = candidate.shown;
     choice.path = *path;
-    choice.after = predicted_covariance(inputs.information + added);
+    choice.after = predicted_hand_eye(inputs.information + added);
     break;
   }
   return choice;

@@ -1,4 +1,5 @@
-/// The next pose from which to look at the board: the one after which the hand-eye transform is known best.
+/// The next pose from which to look at the board, or at several: the one after which the hand-eye transform is known
+/// best.
 #pragma once
 
 #include <span>
@@ -16,9 +17,9 @@ struct CalibrationViewInputs {
   const Body& body;        ///< with the envelope of an unknown camera
   const FreeSpace& space;  ///< the safe zone
   const Clearance& clearance;
-  const ViewDesignModel& model;        ///< a rough hand-eye and board pose will do
-  const Matrix12d& information;        ///< prior_information() plus view_information() of each view taken
-  std::span<const JointVector> taken;  ///< configurations of the views taken
+  std::span<const ViewDesignModel> models;  ///< of each target whose place is known; a rough hand-eye and pose will do
+  Eigen::MatrixXd information;              ///< joint_prior_information() plus joint_view_information() of each view
+  std::span<const JointVector> taken;       ///< configurations of the views taken
 };
 
 enum class DesignCriterion : std::uint8_t {
@@ -38,6 +39,9 @@ struct CalibrationViewOptions {
   double tilt_max_rad = 0.785;                      ///< of aimed poses: 45 degrees
   double different_min_rad = kSharedDeviation_rad;  ///< joint distance to every view taken
   DesignCriterion criterion = DesignCriterion::kCost;
+  /// Bit mask of targets (models[k]: bit k) of which a view must show one, to place them as exactly as can be; the
+  /// criterion is then that of their poses. 0: whatever serves the transform.
+  std::uint32_t wanted = 0;
   double cost_lever_m = 1.0;     ///< design_cost: rotation counts as displacement at this distance
   double cost_drop_min = 0.005;  ///< a view must lower the cost by this share
   int plans_max = 12;            ///< best candidates that the planner may try
@@ -53,11 +57,12 @@ struct CalibrationViewChoice {
   };
   Outcome outcome = Outcome::kNoneFeasible;
   JointVector target;
+  std::uint32_t shown = 0;             ///< bit mask of the targets that it shows
   Path path;                           ///< certified, from the current configuration
   Matrix6d before = Matrix6d::Zero();  ///< predicted covariance of flange_T_camera from the views taken
   Matrix6d after = Matrix6d::Zero();   ///< and with this view
   int considered = 0;                  ///< configurations looked at
-  int feasible = 0;                    ///< of them free, with the whole board in view, not hidden by the arm
+  int feasible = 0;                    ///< of them free, with a whole board in view, not hidden by the arm
 };
 
 /// Square root of the trace of the translation part (m) and of the rotation part (rad): norms over the axes.

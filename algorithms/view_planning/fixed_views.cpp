@@ -88,21 +88,21 @@ Result<CalibrationViewChoice> next_fixed_view(const CalibrationViewInputs& input
                                               const CalibrationViewOptions& options) {
   ENSURE(4541, next >= 0 && next <= kFixedViews);
   const CalibrationViewInputs& in = inputs;
+  const ViewDesignModel& model = in.models.front();
   const PlannerOptions planning{
       .seed = options.seed + options.step, .iterations_max = options.plan_iterations_max, .limits = options.speed};
   const Status begun = planner.begin(in.arm, in.body, in.space, in.clearance, current, planning);
   if (!begun) return std::unexpected(begun.error());
   const JointVector& first = in.taken.empty() ? current : in.taken.front();
-  const auto camera_T_board =
-      (forward(in.arm, first).flange() * in.model.flange_T_camera).inverse() * in.model.base_T_board;
-  const auto views = fixed_views(in.model.camera, in.model.board, camera_T_board, options.limits.margin_px);
+  const auto camera_T_board = (forward(in.arm, first).flange() * model.flange_T_camera).inverse() * model.base_T_board;
+  const auto views = fixed_views(model.camera, model.board, camera_T_board, options.limits.margin_px);
   CalibrationViewChoice choice;
-  choice.before = predicted_covariance(in.information);
+  choice.before = predicted_hand_eye(in.information);
   choice.after = choice.before;
   while (next < kFixedViews) {
     const auto base_T_flange =
-        in.model.base_T_board * views[static_cast<std::size_t>(next++)] * in.model.flange_T_camera.inverse();
-    if (check_view(in.model, base_T_flange, options.limits) != ViewFault::kNone) continue;
+        model.base_T_board * views[static_cast<std::size_t>(next++)] * model.flange_T_camera.inverse();
+    if (check_view(model, base_T_flange, options.limits) != ViewFault::kNone) continue;
     auto postures = inverse(in.arm, base_T_flange, current);
     std::stable_sort(postures.begin(), postures.end(), [&](const JointVector& a, const JointVector& b) {
       return joint_distance_rad(a, current) < joint_distance_rad(b, current);
@@ -110,14 +110,15 @@ Result<CalibrationViewChoice> next_fixed_view(const CalibrationViewInputs& input
     for (const JointVector& q : postures) {
       ++choice.considered;
       if (!configuration_is_free(in.arm, in.body, in.space, in.clearance, q, kTargetMargin_m)) continue;
-      if (hides_board(in.model, place(in.body.capsules, forward(in.arm, q)), base_T_flange)) continue;
+      if (hides_board(model, place(in.body.capsules, forward(in.arm, q)), base_T_flange)) continue;
       ++choice.feasible;
       const Result<Path> path = planner.plan_to(q);
       if (!path) continue;
       choice.outcome = CalibrationViewChoice::Outcome::kChosen;
       choice.target = q;
+      choice.shown = 1;
       choice.path = *path;
-      choice.after = predicted_covariance(in.information + view_information(in.model, base_T_flange));
+      choice.after = predicted_hand_eye(in.information + joint_view_information(in.models, 1, base_T_flange));
       return choice;
     }
   }

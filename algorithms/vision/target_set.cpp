@@ -64,6 +64,12 @@ std::string confusion(const BoardSpec& a, const BoardSpec& b) {
   return {};
 }
 
+/// Names stand in columns of corners.csv and between quotes in YAML.
+bool fits_a_table(std::string_view name) {
+  return std::ranges::all_of(
+      name, [](char c) { return static_cast<unsigned char>(c) >= ' ' && c != ',' && c != '"' && c != '\\'; });
+}
+
 }  // namespace
 
 std::vector<BoardSpec> boards_of(std::span<const NamedTarget> targets) {
@@ -79,6 +85,10 @@ Status check_distinct(std::span<const NamedTarget> targets) {
   }
   for (std::size_t j = 0; j < targets.size(); ++j) {
     if (targets[j].name.empty()) return failure(Fault::kConfigBadValue, "target number {} has no name", j + 1);
+    if (!fits_a_table(targets[j].name)) {
+      return failure(Fault::kConfigBadValue, "the name of target number {} has a comma, a quote or a control character",
+                     j + 1);
+    }
     for (std::size_t i = 0; i < j; ++i) {
       if (targets[i].name == targets[j].name) {
         return failure(Fault::kConfigBadValue, "two targets are named '{:.40}': give each a name of its own",

@@ -36,7 +36,8 @@ class Targets {
 /// The boards without their names.
 [[nodiscard]] std::vector<BoardSpec> boards_of(std::span<const NamedTarget> targets);
 
-/// Refuses no target and more than kTargetsMax, names that are empty or repeated, and any two targets of which a
+/// Refuses no target and more than kTargetsMax, names that are empty, repeated or
+/// no text of a table, and any two targets of which a
 /// detector could take one for the other: lattices with the same counts either way round (the size of the squares
 /// does not show in an image), markers that share codes, two pattern markers.
 /// @return kConfigBadValue with both names, the reason, and what to change

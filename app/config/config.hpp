@@ -67,6 +67,13 @@ struct Config {
     bool operator==(const Board&) const = default;
   } board;
 
+  struct NamedBoard {
+    std::string name;
+    Board board;
+    bool operator==(const NamedBoard&) const = default;
+  };
+  std::vector<NamedBoard> boards;  ///< several, spread over the cell; empty: `board` is the only one
+
   struct Calibration {
     std::string solver = "park-martin";  ///< what starts the joint refinement
     std::string intrinsics = "given";    ///< given | estimate: together with everything else

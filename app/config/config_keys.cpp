@@ -84,39 +84,15 @@ constexpr std::array<std::string_view, 2> kIntrinsics = {"given", "estimate"};
 
 void add_calibration_keys(Keys& keys, Config& c) {
   Config::Calibration& k = c.calibration;
-  keys.push_back({"board.type", &c.board.type, 0, 0, target_type_names(),
-                  "kind of calibration board; one that is set here hangs in the simulated cell, too"});
-  keys.push_back({"board.inner_columns",
-                  &c.board.inner_columns,
-                  1,
-                  30,
-                  {},
-                  "inner corners, circles or markers along a row; odd x even corners avoid a half-turn ambiguity"});
-  keys.push_back({"board.inner_rows",
-                  &c.board.inner_rows,
-                  1,
-                  30,
-                  {},
-                  "the same along a column; boards of one marker ignore both"});
-  keys.push_back({"board.square_size_m",
-                  &c.board.square_size_m,
-                  0.002,
-                  1.0,
-                  {},
-                  "distance of neighbours, side of one square or single marker: measure the print"});
-  keys.push_back({"board.mark_size_m",
-                  &c.board.mark_size_m,
-                  0,
-                  1.0,
-                  {},
-                  "side of a marker's black square, or diameter of a circle; 0: usual for the type"});
-  keys.push_back({"board.dictionary", &c.board.dictionary, 0, 0, dictionary_names(),
-                  "family of the markers; auto: usual for the type"});
-  keys.push_back({"board.first_id", &c.board.first_id, 0, 4095, {}, "number of the first marker"});
-  keys.push_back({"board.legacy", &c.board.legacy, 0, 0, kYesNo,
-                  "ChArUco as OpenCV drew it before 4.6: with an even number of rows of squares the first is white"});
-  keys.push_back({"board.detector", &c.board.detector, 0, 0, detector_preset_names(),
-                  "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
+  for (const ConfigKey& key : board_keys(c.board)) keys.push_back(key);
+  keys.push_back(
+      {"boards",
+       &c.boards,
+       0,
+       kTargetsMax,
+       {},
+       "several in place of 'board', spread over the cell and solved together: [{name: NAME, and the keys of "
+       "'board'}, ...]"});
   keys.push_back({"calibration.solver", &k.solver, 0, 0, solver_names(), "what starts the joint refinement"});
   keys.push_back({"calibration.intrinsics", &k.intrinsics, 0, 0, kIntrinsics,
                   "of the colour camera. given: as the camera states them; estimate: solved for with the rest"});
@@ -270,6 +246,40 @@ void add_margin_keys(Keys& keys, Config& c) {
 
 }  // namespace
 
+std::vector<ConfigKey> board_keys(Config::Board& board) {
+  Keys keys;
+  keys.push_back({"board.type", &board.type, 0, 0, target_type_names(),
+                  "kind of calibration board; one that is set here hangs in the simulated cell, too"});
+  keys.push_back({"board.inner_columns",
+                  &board.inner_columns,
+                  1,
+                  30,
+                  {},
+                  "inner corners, circles or markers along a row; odd x even corners avoid a half-turn ambiguity"});
+  keys.push_back(
+      {"board.inner_rows", &board.inner_rows, 1, 30, {}, "the same along a column; boards of one marker ignore both"});
+  keys.push_back({"board.square_size_m",
+                  &board.square_size_m,
+                  0.002,
+                  1.0,
+                  {},
+                  "distance of neighbours, side of one square or single marker: measure the print"});
+  keys.push_back({"board.mark_size_m",
+                  &board.mark_size_m,
+                  0,
+                  1.0,
+                  {},
+                  "side of a marker's black square, or diameter of a circle; 0: usual for the type"});
+  keys.push_back({"board.dictionary", &board.dictionary, 0, 0, dictionary_names(),
+                  "family of the markers; auto: usual for the type"});
+  keys.push_back({"board.first_id", &board.first_id, 0, 4095, {}, "number of the first marker"});
+  keys.push_back({"board.legacy", &board.legacy, 0, 0, kYesNo,
+                  "ChArUco as OpenCV drew it before 4.6: with an even number of rows of squares the first is white"});
+  keys.push_back({"board.detector", &board.detector, 0, 0, detector_preset_names(),
+                  "settings of the checkerboard's detection; thesis2014...: those of table D-8"});
+  return keys;
+}
+
 std::vector<ConfigKey> config_keys(Config& config) {
   Keys keys;
   add_job_keys(keys, config);
@@ -299,7 +309,7 @@ std::string broken_rule(const Config& c) {
   if (c.calibration.views_min > c.calibration.views_max) {
     return "calibration.views_min must not exceed calibration.views_max";
   }
-  if (const auto board = board_of(c.board); !board) return fmt::format("board: {}", board.error().detail());
+  if (const auto targets = targets_of(c); !targets) return std::string(targets.error().detail());
   // Three views are the fewest that can determine a hand-eye transform (two motions about different axes).
   if (c.calibration.views_min - c.calibration.holdout_views < 3) {
     return "calibration.views_min must exceed calibration.holdout_views by at least 3";

@@ -11,8 +11,9 @@
 namespace firstlook {
 
 /// The field of one Config that a key stands for.
-using ConfigField = std::variant<double*, int*, std::int64_t*, std::string*, std::array<double, 3>*,
-                                 std::optional<JointVector>*, std::vector<Config::KeepOut>*>;
+using ConfigField =
+    std::variant<double*, int*, std::int64_t*, std::string*, std::array<double, 3>*, std::optional<JointVector>*,
+                 std::vector<Config::KeepOut>*, std::vector<Config::NamedBoard>*>;
 
 struct ConfigKey {
   std::string_view path;  ///< with dots: "arm.speed_max_m_s"
@@ -25,6 +26,9 @@ struct ConfigKey {
 /// Every key, in the order in which they are printed; keys of one section stand together. The fields point into
 /// `config`.
 [[nodiscard]] std::vector<ConfigKey> config_keys(Config& config);
+
+/// The keys of one board, as they follow "board." or stand in an item of `boards`.
+[[nodiscard]] std::vector<ConfigKey> board_keys(Config::Board& board);
 
 /// What single ranges cannot say: the first rule between keys that `config` breaks, in words; empty when all hold.
 [[nodiscard]] std::string broken_rule(const Config& config);

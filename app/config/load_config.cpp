@@ -9,6 +9,7 @@
 #include <cmath>
 #include <set>
 
+#include "algorithms/vision/target_set.hpp"
 #include "app/config/config_keys.hpp"
 #include "app/config/nearest_name.hpp"
 #include "platform/linux/files.hpp"
@@ -135,6 +136,46 @@ class FieldReader {
       boxes.push_back(read_box);
     }
     target = std::move(boxes);
+    return {};
+  }
+
+  Status read(const YAML::Node& node, std::vector<Config::NamedBoard>& target) {
+    if (!node.IsSequence() || node.size() > kTargetsMax) {
+      return wrong(node, fmt::format("must be a list of at most {} boards", kTargetsMax));
+    }
+    std::vector<Config::NamedBoard> boards(node.size());
+    for (std::size_t i = 0; i < node.size(); ++i) {
+      if (Status status = read_board(node[i], fmt::format("{}[{}]", key_.path, i), boards[i]); !status) return status;
+    }
+    target = std::move(boards);
+    return {};
+  }
+
+  /// An item of `boards`: a name, and the keys of `board`.
+  Status read_board(const YAML::Node& node, const std::string& path, Config::NamedBoard& target) {
+    if (!node.IsMap()) return wrong(node, "needs a map in each item: a name and the keys of 'board'");
+    std::vector<ConfigKey> keys = board_keys(target.board);
+    keys.push_back({"board.name", &target.name, 0, 0, {}, {}});
+    std::set<std::string> seen;
+    for (const auto& pair : node) {
+      const Place where = place(pair.first);
+      const std::string name = pair.first.IsScalar() ? pair.first.Scalar() : std::string();
+      if (!seen.insert(name).second) {
+        return failure(Fault::kConfigBadValue, "{}: {}.{:.40} is given twice", where.text(), path, name);
+      }
+      const auto key = std::ranges::find(keys, "board." + name, &ConfigKey::path);
+      if (key == keys.end()) {
+        std::vector<std::string_view> names;
+        for (const ConfigKey& k : keys) names.push_back(k.path.substr(k.path.find('.') + 1));
+        return failure(Fault::kConfigUnknownKey, "{}: {}.{:.40}; did you mean {}?", where.text(), path, name,
+                       nearest_name(name, names));
+      }
+      const std::string full = path + "." + name;
+      ConfigKey here = *key;
+      here.path = full;
+      if (Status status = FieldReader(here, source_, in_file_).read(pair.second); !status) return status;
+    }
+    if (target.name.empty()) return wrong(node, fmt::format("needs a name in each item: {}.name is missing", path));
     return {};
   }
 

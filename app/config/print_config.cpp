@@ -48,10 +48,31 @@ std::string yaml_value(const std::vector<Config::KeepOut>& v) {
   }
   return "[" + boxes + "]";
 }
+std::string yaml_value(const std::vector<Config::NamedBoard>& v) {
+  std::string boards;
+  for (Config::NamedBoard named : v) {
+    boards += fmt::format("{}{{name: {}", boards.empty() ? "" : ", ", yaml_text(named.name));
+    for (const ConfigKey& key : board_keys(named.board)) {
+      const std::string value = std::visit(
+          [](const auto* field) -> std::string {
+            if constexpr (std::is_same_v<decltype(field), const std::vector<Config::NamedBoard>*>) {
+              return {};  // a board holds no boards
+            } else {
+              return yaml_value(*field);
+            }
+          },
+          key.field);
+      boards += fmt::format(", {}: {}", key.path.substr(key.path.find('.') + 1), value);
+    }
+    boards += '}';
+  }
+  return "[" + boards + "]";
+}
 
 std::string limits_text(const ConfigKey& key) {
   if (!key.choices.empty()) return fmt::format("; {}", fmt::join(key.choices, " | "));
   if (std::holds_alternative<std::string*>(key.field)) return {};
+  if (std::holds_alternative<std::vector<Config::NamedBoard>*>(key.field)) return fmt::format("; at most {}", key.high);
   return fmt::format("; {} to {}", key.low, key.high);
 }
 
@@ -68,6 +89,7 @@ std::string print_config(const Config& config) {
     const std::size_t dot = key.path.find('.');
     const std::string_view key_section = dot == std::string_view::npos ? std::string_view() : key.path.substr(0, dot);
     const std::string_view name = dot == std::string_view::npos ? key.path : key.path.substr(dot + 1);
+    if (key_section == "board" && !config.boards.empty()) continue;  // one or the other
     if (!key_section.empty() && key_section != section) out += fmt::format("\n{}:\n", key_section);
     if (key_section.empty()) out += '\n';
     section = key_section;

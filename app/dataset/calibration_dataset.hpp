@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,8 +53,9 @@ struct CalibrationDataset {
 /// The same for a file of one target. @return also kDataMalformed for several
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);
 
-/// The text of a board.yaml.
+/// The text of a board.yaml: of one board, and of one without a name or several.
 [[nodiscard]] std::string board_yaml(const BoardSpec& board);
+[[nodiscard]] std::string board_yaml(std::span<const NamedTarget> targets);
 
 /// camera_info.yaml as ROS writes it. @return kDataMissing, kDataMalformed
 [[nodiscard]] Result<CameraIntrinsics> read_camera_info(const std::filesystem::path& file);

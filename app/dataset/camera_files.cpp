@@ -151,6 +151,19 @@ std::string board_yaml(const BoardSpec& board) {
   return text;
 }
 
+std::string board_yaml(std::span<const NamedTarget> targets) {
+  if (targets.size() == 1) return board_yaml(targets.front().board);
+  std::string text = "boards:\n";
+  for (const NamedTarget& target : targets) {
+    std::string entry = fmt::format("name: \"{}\"\n", target.name) + board_yaml(target.board);
+    entry.pop_back();
+    text += "  - ";
+    for (const char c : entry) text += c == '\n' ? std::string("\n    ") : std::string(1, c);
+    text += '\n';
+  }
+  return text;
+}
+
 Result<std::vector<NamedTarget>> read_targets(const std::filesystem::path& file) {
   return load<std::vector<NamedTarget>>(file, parse_targets);
 }

@@ -61,20 +61,21 @@ DepthMount Workbench::stated_mount() const {
                         config_.calibration.depth_sigma_mrad * 1e-3, kScaleSigma);
 }
 
-Result<BoardPlane> Workbench::plane_of(const hal::Frame& frame, const Transform<Camera, Board>& camera_T_board) {
+Result<BoardPlane> Workbench::plane_of(const hal::Frame& frame, int target,
+                                       const Transform<Camera, Board>& camera_T_board) {
   const CameraIntrinsics& camera = depth_.intrinsics();
   const ImageView<std::uint16_t> pixels{depth_pixels_.items().data(), camera.width, camera.height};
   if (const Status read = depth_.read(frame, pixels); !read) return std::unexpected(read.error());
   BoardPlaneOptions options;
   options.noise_at_1m = config_.depth.noise_at_1m_m;
   const DepthImage image{{pixels.data, pixels.width, pixels.height}, depth_.units_per_m()};
-  return find_board_plane(image, camera, board_, facts_.camera_T_depth.inverse() * camera_T_board, options);
+  return find_board_plane(image, camera, board(target), facts_.camera_T_depth.inverse() * camera_T_board, options);
 }
 
-std::optional<BoardPlane> Workbench::plane_beside(const DetectArguments& arguments, const BoardPose& pose) {
+std::optional<BoardPlane> Workbench::plane_beside(const DetectArguments& arguments, int target, const BoardPose& pose) {
   std::vector<BoardPlane> planes;
   for (const PosedFrame& posed : arguments.depth_frames) {
-    if (const auto plane = plane_of(posed.frame, pose.camera_T_board)) planes.push_back(*plane);
+    if (const auto plane = plane_of(posed.frame, target, pose.camera_T_board)) planes.push_back(*plane);
   }
   if (planes.empty()) return std::nullopt;
   return merged(planes);
@@ -83,18 +84,22 @@ std::optional<BoardPlane> Workbench::plane_beside(const DetectArguments& argumen
 WayResult Workbench::see_on_the_way(const WayArguments& arguments) {
   WayResult result;
   if (way_sights_.size() == way_sights_.capacity()) return result;
-  auto corners = corners_of(arguments.color);
+  if (!read_picture(arguments.color)) return result;
+  int target = 0;  // the first that is seen
+  auto corners = corners_of(arguments.color, target);
+  while (!corners && ++target < static_cast<int>(boards_.size())) corners = corners_of(arguments.color, target);
   if (!corners) return result;
-  const auto pose = estimate_board_pose(color_.intrinsics(), board_, *corners);
+  const auto pose = estimate_board_pose(color_.intrinsics(), board(target), *corners);
   if (!pose) return result;
   result.seen = true;
   WaySight sight;
+  sight.target = target;
   sight.color_stamp_s = arguments.color.stamp.seconds();
   sight.corners = std::move(*corners);
   sight.motion = static_cast<int>(arguments.motion);
   for (const JointsAtTime& joints : arguments.joints) sight.joints.push_back({joints.stamp.seconds(), joints.at_rad});
   if (arguments.has_depth) {
-    if (const auto plane = plane_of(arguments.depth, pose->camera_T_board)) {
+    if (const auto plane = plane_of(arguments.depth, target, pose->camera_T_board)) {
       sight.depth_stamp_s = arguments.depth.stamp.seconds();
       sight.plane = *plane;
       result.plane = true;
@@ -120,19 +125,20 @@ void Workbench::align_depth_camera() {
     const Observation& o = observations_[counted[k]];
     const bool wrong = k < hand_eye_->fits.size() && !hand_eye_->fits[k].used;
     if (!o.plane || wrong) continue;
-    const auto pose = estimate_board_pose(camera(), board_, SeenPoints(o.view.corners_px, o.view.ids));
+    const auto pose = estimate_board_pose(camera(), board(o.view.target), SeenPoints(o.view.corners_px, o.view.ids));
     if (!pose) continue;
     BoardPose settled = *pose;
     if (settled.other && !same_board(settled.camera_T_board, o.pose.camera_T_board)) {
       settled.camera_T_board = pose->other->camera_T_board;
       settled.unit_covariance = pose->other->unit_covariance;
     }
-    stops.push_back({settled.camera_T_board, sigma_px * sigma_px * settled.unit_covariance, *o.plane});
+    stops.push_back({settled.camera_T_board, sigma_px * sigma_px * settled.unit_covariance, *o.plane,
+                     board(o.view.target).center()});
   }
   record.views = static_cast<int>(stops.size());
   const DepthMount stated = stated_mount();
   record.mount = stated;  // what is not found is as sure as its data sheet
-  auto estimate = estimate_depth_to_color(stops, stated, board_);
+  auto estimate = estimate_depth_to_color(stops, stated);
   if (!estimate) {
     record.reason = estimate.error().detail();
     return;
@@ -144,25 +150,50 @@ void Workbench::align_depth_camera() {
 
 /// The board's pose in a frame on the way, with the camera as solved.
 std::optional<SeenPose> Workbench::seen_pose(const WaySight& sight) const {
-  const auto pose = estimate_board_pose(camera(), board_, sight.corners);
+  const BoardSpec& board = this->board(sight.target);
+  const auto pose = estimate_board_pose(camera(), board, sight.corners);
   if (!pose || sight.joints.empty()) return std::nullopt;
   const JointVector& near = sight.joints[sight.joints.size() / 2].joints_rad;
   const auto flange = forward(arm_, near).flange();
-  const auto expected = (flange * hand_eye_->flange_T_camera).inverse() * hand_eye_->base_T_board;
-  const OpenView open = open_view(board_, {flange, sight.corners.corners_px, sight.corners.ids}, *pose);
+  const auto expected = (flange * hand_eye_->flange_T_camera).inverse() *
+                        hand_eye_->targets[static_cast<std::size_t>(sight.target)].base_T_board;
+  const OpenView open = open_view(board, {flange, sight.corners.corners_px, sight.corners.ids}, *pose);
   // One frame, where the solve had the mean of several.
   const double single = std::sqrt(static_cast<double>(std::max(1, config_.calibration.frames_per_view)));
   const double sigma_px = std::max({single * hand_eye_->corner_sigma_px, kCornerSigmaMin_px, pose->residual_rms_px});
   return SeenPose{nearest_choice(open, expected), sigma_px * sigma_px * pose->unit_covariance};
 }
 
+/// The solved target that frames on the way showed most often: they are compared with its place alone.
+int Workbench::target_on_the_way() const {
+  std::vector<int> sights(boards_.size());
+  for (const WaySight& sight : way_sights_) {
+    const auto k = static_cast<std::size_t>(sight.target);
+    if (hand_eye_->targets[k].views > 0) ++sights[k];
+  }
+  return static_cast<int>(std::max_element(sights.begin(), sights.end()) - sights.begin());
+}
+
+/// Covariance of hand-eye and one solved target.
+Matrix12d Workbench::covariance_with(int target) const {
+  Eigen::Index at = 6;
+  for (int k = 0; k < target; ++k) at += hand_eye_->targets[static_cast<std::size_t>(k)].views > 0 ? 6 : 0;
+  const Eigen::MatrixXd& joint = hand_eye_->joint_covariance;
+  Matrix12d covariance;
+  covariance << joint.topLeftCorner<6, 6>(), joint.block<6, 6>(0, at), joint.block<6, 6>(at, 0),
+      joint.block<6, 6>(at, at);
+  return covariance;
+}
+
 void Workbench::align_stamps() {
   if (config_.calibration.time_offset != "estimate") return;
+  const int target = target_on_the_way();
+  if (hand_eye_->targets[static_cast<std::size_t>(target)].views == 0) return;
   TimedCell cell;
   cell.arm = arm_;
   cell.flange_T_camera = hand_eye_->flange_T_camera;
-  cell.base_T_board = hand_eye_->base_T_board;
-  cell.covariance = hand_eye_->joint_covariance.topLeftCorner<12, 12>();
+  cell.base_T_board = hand_eye_->targets[static_cast<std::size_t>(target)].base_T_board;
+  cell.covariance = covariance_with(target);
   cell.arm_sigma = hand_eye_->arm_sigma;
   cell.depth = alignment_.depth_camera.mount;
   Vector7d exact;
@@ -171,6 +202,7 @@ void Workbench::align_stamps() {
 
   std::vector<MovingFrame> color, depth;
   for (const WaySight& sight : way_sights_) {
+    if (sight.target != target) continue;
     if (const auto pose = seen_pose(sight)) color.push_back({sight.color_stamp_s, sight.joints, *pose, sight.motion});
     if (sight.plane) depth.push_back({sight.depth_stamp_s, sight.joints, *sight.plane, sight.motion});
   }

@@ -37,63 +37,97 @@ ViewList Workbench::identify_motions(const FromHere& here) {
                                              blind_terms_.clearance(), here.at_rad));
 }
 
-Result<CornerSet> Workbench::corners_of(const hal::Frame& frame) {
-  if (const auto delivered = color_.read_corners(frame)) {
+Status Workbench::read_picture(const hal::Frame& frame) {
+  if (color_.read_corners(frame, 0)) return {};
+  const CameraIntrinsics& camera = color_.intrinsics();
+  return color_.read(frame, {gray_.items().data(), camera.width, camera.height});
+}
+
+/// Of the picture that was read last.
+Result<CornerSet> Workbench::corners_of(const hal::Frame& frame, int target) {
+  const BoardSpec& board = this->board(target);
+  if (const auto delivered = color_.read_corners(frame, target)) {
     CornerSet set;
     for (const auto& c : delivered->corners_px) set.corners_px.emplace_back(c[0], c[1]);
-    if (static_cast<int>(set.corners_px.size()) != board_.corners()) {
+    if (static_cast<int>(set.corners_px.size()) != board.corners()) {
       return failure(Fault::kBoardNotFound, "the camera reports {} corners", set.corners_px.size());
     }
     return set;
   }
   const CameraIntrinsics& camera = color_.intrinsics();
-  const MutableGrayImage image{gray_.items().data(), camera.width, camera.height};
-  if (const Status read = color_.read(frame, image); !read) return std::unexpected(read.error());
-  const auto preset = find_detector_preset(config_.board.detector).value_or(DetectorPreset{});
-  return detect_target(GrayImage{image.data, image.width, image.height}, board_, preset.detection);
+  const std::string& detector =
+      config_.boards.empty() ? config_.board.detector : config_.boards[static_cast<std::size_t>(target)].board.detector;
+  const auto preset = find_detector_preset(detector).value_or(DetectorPreset{});
+  return detect_target(GrayImage{gray_.items().data(), camera.width, camera.height}, board, preset.detection);
 }
 
 BoardSight Workbench::sight_of(const DetectArguments& arguments) {
-  std::vector<CornerSet> found;
-  for (const PosedFrame& posed : arguments.frames) {
-    auto corners = corners_of(posed.frame);
-    if (corners) found.push_back(std::move(*corners));
-    // A board that is not in the first frame of a standing arm is not in the others.
-    if (found.empty()) break;
+  std::vector<std::vector<CornerSet>> found(boards_.size());
+  for (std::size_t f = 0; f < arguments.frames.size(); ++f) {
+    const hal::Frame& frame = arguments.frames[f].frame;
+    if (!read_picture(frame)) continue;
+    for (std::size_t k = 0; k < boards_.size(); ++k) {
+      // A board that is not in the first frame of a standing arm is not in the others.
+      if (f > 0 && found[k].empty()) continue;
+      if (auto corners = corners_of(frame, static_cast<int>(k))) found[k].push_back(std::move(*corners));
+    }
+    if (std::ranges::all_of(found, &std::vector<CornerSet>::empty)) break;
   }
   BoardSight sight;
-  if (found.empty() || found.size() * 2 < arguments.frames.size()) return sight;  // not even half of the frames show it
-  if (auto picture = judge_standing(found)) {
-    sight.still = picture->still;
-    sight.moved_px = picture->moved_px;
-    if (sight.still || arguments.looks >= kLooksMax) sight.picture = std::move(*picture);
-  } else {
-    sight.still = false;
-    sight.moved_px = kFramesAgree_px;  // at least: average_corners found no two alike
+  for (std::size_t k = 0; k < boards_.size(); ++k) {
+    if (found[k].empty() || found[k].size() * 2 < arguments.frames.size()) continue;  // not even half of the frames
+    if (auto picture = judge_standing(found[k])) {
+      sight.still = sight.still && picture->still;
+      sight.moved_px = std::max(sight.moved_px, picture->moved_px);
+      sight.targets.push_back({static_cast<int>(k), std::move(*picture)});
+    } else {
+      sight.still = false;
+      sight.moved_px = std::max(sight.moved_px, kFramesAgree_px);  // at least: average_corners found no two alike
+    }
   }
+  if (!sight.still && arguments.looks < kLooksMax) sight.targets.clear();
   return sight;
 }
 
-/// The frame that was read last is the picture of this observation.
-void Workbench::keep_picture(std::size_t observation) {
+/// The frame that was read last is the picture of this stop.
+void Workbench::keep_picture(std::size_t stop) {
   const std::size_t pixels = gray_.size();
-  if ((observation + 1) * pixels > pictures_.size()) return;
+  if ((stop + 1) * pixels > pictures_.size()) return;
   const auto from = gray_.items();
-  std::copy(from.begin(), from.end(), pictures_.items().begin() + static_cast<std::ptrdiff_t>(observation * pixels));
+  std::copy(from.begin(), from.end(), pictures_.items().begin() + static_cast<std::ptrdiff_t>(stop * pixels));
+}
+
+std::size_t Workbench::stops() const {
+  return observations_.empty() ? 0 : static_cast<std::size_t>(observations_.back().view.station) + 1;
 }
 
 /// Which of the poses that each picture allows was true: the views taken so far tell it of each other.
 void Workbench::settle_observations(BoardLook purpose) {
   std::vector<OpenView> open;
-  for (const Observation& o : observations_) open.push_back(open_view(board_, o.view, o.pose));
+  for (const Observation& o : observations_) open.push_back(open_view(board(o.view.target), o.view, o.pose));
   const bool verifies = purpose == BoardLook::kVerify && facts_.stored;
   const auto choices = verifies ? settle_choices(open, facts_.stored->flange_T_camera) : settle_choices(open);
   for (std::size_t i = 0; i < open.size(); ++i) {
     const PoseChoice& choice = open[i].choices[choices[i]];
     Observation& o = observations_[i];
-    adopt_choice(board_, choice, o.pose);
+    adopt_choice(board(o.view.target), choice, o.pose);
     if (choice.reversed) std::reverse(o.view.corners_px.begin(), o.view.corners_px.end());
   }
+}
+
+void Workbench::observe(std::size_t stop, const DetectArguments& arguments, const BoardSight& sight,
+                        const BoardSight::Target& seen, const BoardPose& pose) {
+  const PosedFrame& last = arguments.frames.back();
+  Observation o;
+  o.joints_rad = last.at_rad;
+  o.time_s = last.frame.stamp.seconds();
+  o.view = {forward(arm_, last.at_rad).flange(), seen.picture.mean.corners_px, seen.picture.mean.ids, seen.target,
+            static_cast<int>(stop)};
+  o.pose = pose;
+  o.residual_rms_px = pose.residual_rms_px;
+  o.settling = {static_cast<int>(arguments.looks), sight.moved_px, seen.picture.scatter_px, sight.still};
+  o.plane = plane_beside(arguments, seen.target, pose);
+  observations_.push_back(std::move(o));
 }
 
 DetectResult Workbench::detect_board(const DetectArguments& arguments) {
@@ -102,35 +136,41 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   const BoardSight sight = sight_of(arguments);
   result.still = sight.still;
   result.moved_px = sight.moved_px;
-  if (!sight.picture) return result;
-  const CornerSet& corners = sight.picture->mean;
-  const auto pose = estimate_board_pose(camera(), board_, corners);
-  if (!pose) return result;
-  result.found = true;
-  result.rms_px = pose->residual_rms_px;
-  const Eigen::Vector3d p = pose->camera_T_board.translation();
-  const Eigen::Quaterniond q = pose->camera_T_board.quaternion();
-  result.camera_p_board_m = {p.x(), p.y(), p.z()};
-  result.camera_q_board_xyzw = {q.x(), q.y(), q.z(), q.w()};
-
+  const bool first_sight = std::ranges::none_of(identify_reference_, [](const auto& pose) { return pose.has_value(); });
+  const bool observes = (arguments.purpose == BoardLook::kCollect || arguments.purpose == BoardLook::kVerify) &&
+                        stops() < static_cast<std::size_t>(config_.calibration.views_max);
+  const std::size_t stop = stops();
   const PosedFrame& last = arguments.frames.back();
-  last_stamp_s_ = std::max(last_stamp_s_, last.frame.stamp.seconds());
-  if (arguments.purpose == BoardLook::kLocate) identify_reference_ = *pose;
-  if (arguments.purpose == BoardLook::kIdentify && identify_reference_) {
-    result.changed = compare_views(color_.intrinsics(), board_, *identify_reference_, *pose).changed;
+  for (const BoardSight::Target& seen : sight.targets) {
+    const auto k = static_cast<std::size_t>(seen.target);
+    const auto pose = estimate_board_pose(camera(), boards_[k], seen.picture.mean);
+    if (!pose) continue;
+    const bool compared = arguments.purpose == BoardLook::kIdentify && identify_reference_[k];
+    // A board that was not there before says nothing of what a joint moves.
+    if (arguments.purpose == BoardLook::kIdentify && !compared) continue;
+    if (!result.found) {
+      result.rms_px = pose->residual_rms_px;
+      const Eigen::Vector3d p = pose->camera_T_board.translation();
+      const Eigen::Quaterniond q = pose->camera_T_board.quaternion();
+      result.camera_p_board_m = {p.x(), p.y(), p.z()};
+      result.camera_q_board_xyzw = {q.x(), q.y(), q.z(), q.w()};
+    }
+    result.found = true;
+    result.targets |= static_cast<TargetMask>(1U << k);
+    if (arguments.purpose == BoardLook::kLocate) {
+      if (first_sight) identify_reference_[k] = *pose;
+      if (!located_[k]) located_[k] = LocatedTarget{forward(arm_, last.at_rad).flange(), pose->camera_T_board};
+    }
+    if (compared) {
+      const auto change = compare_views(color_.intrinsics(), boards_[k], *identify_reference_[k], *pose);
+      result.changed = result.changed || change.changed;
+    }
+    if (observes) observe(stop, arguments, sight, seen, *pose);
   }
-  if ((arguments.purpose == BoardLook::kCollect || arguments.purpose == BoardLook::kVerify) &&
-      observations_.size() < static_cast<std::size_t>(config_.calibration.views_max)) {
-    Observation o;
-    o.joints_rad = last.at_rad;
-    o.time_s = last.frame.stamp.seconds();
-    o.view = {forward(arm_, last.at_rad).flange(), corners.corners_px, corners.ids};
-    o.pose = *pose;
-    o.residual_rms_px = pose->residual_rms_px;
-    o.settling = {static_cast<int>(arguments.looks), sight.moved_px, sight.picture->scatter_px, sight.still};
-    o.plane = plane_beside(arguments, *pose);
-    keep_picture(observations_.size());
-    observations_.push_back(std::move(o));
+  if (!result.found) return result;
+  last_stamp_s_ = std::max(last_stamp_s_, last.frame.stamp.seconds());
+  if (observes) {
+    keep_picture(stop);
     settle_observations(arguments.purpose);
   }
   return result;
@@ -142,29 +182,49 @@ CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {
   const BoardSight sight = sight_of(arguments);
   result.still = sight.still;
   result.moved_px = sight.moved_px;
-  if (!sight.picture) return result;
-  const auto pose = estimate_board_pose(camera(), board_, sight.picture->mean);
-  if (!pose) return result;
-  result.seen = true;
-  const auto base_T_flange = forward(arm_, arguments.frames.back().at_rad).flange();
-  const auto base_T_board = base_T_flange * hand_eye_->flange_T_camera * pose->camera_T_board;
-  const Eigen::Vector3d middle = board_.center();
-  result.shift_mm = 1000 * (base_T_board * middle - hand_eye_->base_T_board * middle).norm();
+  for (const BoardSight::Target& seen : sight.targets) {
+    const auto k = static_cast<std::size_t>(seen.target);
+    if (k >= hand_eye_->targets.size() || hand_eye_->targets[k].views == 0) continue;
+    const auto pose = estimate_board_pose(camera(), boards_[k], seen.picture.mean);
+    if (!pose) continue;
+    const auto bit = static_cast<TargetMask>(1U << k);
+    result.seen |= bit;
+    const BoardShift shift = shift_of(seen.target, *pose, forward(arm_, arguments.frames.back().at_rad).flange());
+    if (shift.shift_m > shift.limit_m) result.moved |= bit;
+    if (result.limit_mm > 0 && 1000 * shift.shift_m - 1000 * shift.limit_m <= result.shift_mm - result.limit_mm)
+      continue;
+    result.shift_mm = 1000 * shift.shift_m;
+    result.limit_mm = 1000 * shift.limit_m;
+  }
+  return result;
+}
 
-  // What a board that stands still may seem to have moved, 3 sigma: the hand-eye and the arm at the board's distance,
-  // and the pose estimate itself.
-  const double distance = (pose->camera_T_board * middle).norm();
+/// How far a target seems to have moved, and how far one that stands still may seem to, 3 sigma: the hand-eye and the
+/// arm at the board's distance, and the pose estimate itself.
+Workbench::BoardShift Workbench::shift_of(int target, const BoardPose& pose,
+                                          const Transform<Base, Flange>& base_T_flange) const {
+  const auto base_T_board = base_T_flange * hand_eye_->flange_T_camera * pose.camera_T_board;
+  const Eigen::Vector3d middle = board(target).center();
+  const auto& before = hand_eye_->targets[static_cast<std::size_t>(target)].base_T_board;
+  const double distance = (pose.camera_T_board * middle).norm();
   const double hand_eye_sigma = point_sigma(hand_eye_->flange_T_camera, hand_eye_->covariance, distance);
   const double arm_sigma = std::hypot(hand_eye_->arm_sigma.translation_m, hand_eye_->arm_sigma.rotation_rad * distance);
   const double corner_sigma = std::max(hand_eye_->corner_sigma_px, 0.05);
-  const Matrix6d look = corner_sigma * corner_sigma * pose->unit_covariance;
+  const Matrix6d look = corner_sigma * corner_sigma * pose.unit_covariance;
   const double look_sigma =
       std::sqrt(look.topLeftCorner<3, 3>().trace() + middle.squaredNorm() * look.bottomRightCorner<3, 3>().trace());
   const double sigma =
       std::sqrt(3 * (hand_eye_sigma * hand_eye_sigma + arm_sigma * arm_sigma) + look_sigma * look_sigma);
-  result.limit_mm = 1000 * 3 * sigma;
-  result.moved = result.shift_mm > result.limit_mm;
-  return result;
+  return {(base_T_board * middle - before * middle).norm(), 3 * sigma};
+}
+
+/// Those whose place the calibration, or the test of a stored one, gave.
+TargetMask Workbench::solved_targets() const {
+  TargetMask mask = 0;
+  for (std::size_t k = 0; hand_eye_ && k < hand_eye_->targets.size(); ++k) {
+    if (hand_eye_->targets[k].views > 0) mask |= static_cast<TargetMask>(1U << k);
+  }
+  return mask;
 }
 
 }  // namespace firstlook

@@ -1,5 +1,7 @@
 /// Jobs of the calibration: the next view of the board, the solve, the verdict.
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "algorithms/calibration/view_spread.hpp"
 #include "algorithms/view_planning/fixed_views.hpp"
@@ -13,12 +15,19 @@ constexpr std::size_t kIndependentMin = 6;  // of so many views a solve can make
 constexpr std::size_t kBootstrapViews = 4;  // three motions determine a rough transform, one more for a bad view
 }  // namespace
 
-/// The views that count: those that share an arm deviation with a later one are left out, unless few would remain.
+/// The views that count: those of stops that share an arm deviation with a later one are left out, unless few would
+/// remain.
 std::vector<std::size_t> Workbench::independent_observations() const {
-  std::vector<JointVector> configurations;
-  for (const Observation& o : observations_) configurations.push_back(o.joints_rad);
-  const auto apart = spread_views(configurations);
-  return apart.size() >= kIndependentMin ? apart : spread_views(configurations, 0);
+  std::vector<JointVector> configurations(stops());
+  for (const Observation& o : observations_) configurations[static_cast<std::size_t>(o.view.station)] = o.joints_rad;
+  auto apart = spread_views(configurations);
+  if (apart.size() < kIndependentMin) apart = spread_views(configurations, 0);
+  std::vector<std::size_t> independent;
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    const auto stop = static_cast<std::size_t>(observations_[i].view.station);
+    if (std::ranges::binary_search(apart, stop)) independent.push_back(i);
+  }
+  return independent;
 }
 
 std::vector<CalibrationView> Workbench::views() const {
@@ -55,23 +64,44 @@ HandEyeOptions Workbench::solve_options() const {
   return options;
 }
 
-/// What the views taken so far say about hand-eye and board; empty until they determine it.
+/// The models of the targets whose place is known, from views or, roughly, from where they were located.
+void Workbench::place_targets(const ViewDesignModel& common, const std::vector<PosePair>& pairs,
+                              std::span<const TargetPose> refined, RoughModel& rough) const {
+  for (std::size_t k = 0; k < boards_.size(); ++k) {
+    const std::vector<PosePair> own = pairs_of_target(pairs, static_cast<int>(k));
+    ViewDesignModel model = common;
+    model.board = boards_[k];
+    if (k < refined.size() && refined[k].views > 0) {
+      model.base_T_board = refined[k].base_T_board;
+    } else if (!own.empty()) {
+      model.base_T_board = mean_board_pose(own, common.flange_T_camera);
+    } else if (located_[k]) {
+      model.base_T_board = located_[k]->base_T_flange * common.flange_T_camera * located_[k]->camera_T_board;
+    } else {
+      continue;
+    }
+    rough.models.push_back(model);
+    rough.targets.push_back(static_cast<int>(k));
+  }
+}
+
+/// What the views taken so far say about hand-eye and boards; empty until they determine it.
 std::optional<Workbench::RoughModel> Workbench::rough_model() const {
-  if (observations_.size() < kBootstrapViews) return std::nullopt;
+  if (stops() < kBootstrapViews) return std::nullopt;
   std::vector<PosePair> pairs;
-  for (const Observation& o : observations_) pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board});
-  const auto rough = solve_closed_form(pairs);
-  if (!rough) return std::nullopt;
+  for (const Observation& o : observations_) {
+    pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board, o.view.target, o.view.station});
+  }
+  const auto closed_form = solve_closed_form(pairs);
+  if (!closed_form) return std::nullopt;
   RoughModel result;
-  ViewDesignModel& model = result.model;
+  ViewDesignModel model;
   model.camera = color_.intrinsics();
-  model.board = board_;
-  model.flange_T_camera = *rough;
-  model.base_T_board = mean_board_pose(pairs, *rough);
+  model.flange_T_camera = *closed_form;
   model.corner_sigma_px = config_.calibration.corner_sigma_px;
   model.arm_sigma = arm_sigma_expected();
   RefinementOptions options;
-  const bool measured = observations_.size() >= kIndependentMin;
+  const bool measured = stops() >= kIndependentMin;
   options.corner_sigma_px = measured ? 0 : model.corner_sigma_px;
   options.arm_sigma = model.arm_sigma;
   options.rounds_max = measured ? 3 : 1;
@@ -80,20 +110,54 @@ std::optional<Workbench::RoughModel> Workbench::rough_model() const {
   const auto adopt = [&](const Refinement& refined) {
     model.camera = refined.camera;
     model.flange_T_camera = refined.flange_T_camera;
-    model.base_T_board = refined.base_T_board;
     model.corner_sigma_px = refined.corner_sigma_px;
     if (refined.intrinsics) result.covariance = refined.covariance;
+    place_targets(model, pairs, refined.targets, result);
   };
   if (estimates_intrinsics()) {
     options.intrinsics = EstimatedIntrinsics::kWithoutK3;
-    if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) {
+    if (const auto refined = refine_hand_eye(model.camera, boards_, taken, *closed_form, options)) {
       adopt(*refined);
       return result;
     }
     options.intrinsics = EstimatedIntrinsics::kNone;  // too few views yet: as if the stated ones were right
   }
-  if (const auto refined = refine_hand_eye(model.camera, board_, taken, *rough, options)) adopt(*refined);
+  if (const auto refined = refine_hand_eye(model.camera, boards_, taken, *closed_form, options)) {
+    adopt(*refined);
+  } else {
+    place_targets(model, pairs, {}, result);
+  }
   return result;
+}
+
+Eigen::MatrixXd Workbench::information_of(const RoughModel& rough, std::span<const std::size_t> observations) const {
+  Eigen::MatrixXd information = joint_prior_information(rough.models.size());
+  for (std::size_t i = 0; i < observations.size();) {
+    const CalibrationView& first = observations_[observations[i]].view;
+    std::uint32_t shown = 0;
+    for (; i < observations.size() && observations_[observations[i]].view.station == first.station; ++i) {
+      const int target = observations_[observations[i]].view.target;
+      shown |= 1U << (std::ranges::find(rough.targets, target) - rough.targets.begin());
+    }
+    information += joint_view_information(rough.models, shown, first.base_T_flange);
+  }
+  return information;
+}
+
+/// A target that was seen from few places is placed by them alone: it gets some views for its own sake, unless they do
+/// not show it.
+std::uint32_t Workbench::wanted_targets(const RoughModel& rough) const {
+  constexpr std::ptrdiff_t kViewsWanted = 4;
+  constexpr int kTriesMax = 6;
+  if (boards_.size() == 1) return 0;
+  std::uint32_t wanted = 0;
+  for (std::size_t m = 0; m < rough.targets.size(); ++m) {
+    const int target = rough.targets[m];
+    const auto views =
+        std::ranges::count_if(observations_, [&](const Observation& o) { return o.view.target == target; });
+    if (views < kViewsWanted && sought_[static_cast<std::size_t>(target)] < kTriesMax) wanted |= 1U << m;
+  }
+  return wanted;
 }
 
 CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
@@ -101,8 +165,12 @@ CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   if (bootstrap_.empty()) bootstrap_.push_back(here.at_rad);  // where the board was seen is a view, too
   // Around where the arm is now, then around each view that saw the board, until enough views did.
-  while (bootstrap_next_ == bootstrap_.size() && bootstrap_centers_ <= observations_.size() && !bootstrap_.full()) {
-    const JointVector center = bootstrap_centers_ == 0 ? here.at_rad : observations_[bootstrap_centers_ - 1].joints_rad;
+  while (bootstrap_next_ == bootstrap_.size() && bootstrap_centers_ <= stops() && !bootstrap_.full()) {
+    const auto at_stop = [&](const Observation& o) {
+      return static_cast<std::size_t>(o.view.station) + 1 == bootstrap_centers_;
+    };
+    const JointVector center =
+        bootstrap_centers_ == 0 ? here.at_rad : std::ranges::find_if(observations_, at_stop)->joints_rad;
     ++bootstrap_centers_;
     const auto views = bootstrap_views(arm_, envelope_body_, space, blind_terms_.clearance(), center);
     if (!views) continue;
@@ -125,32 +193,48 @@ CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
 CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   const auto rough = rough_model();
   if (!rough) return next_bootstrap_view(here);
-  const ViewDesignModel& model = rough->model;
-  Matrix12d information = prior_information();
+  const std::vector<std::size_t> counted = independent_observations();
   std::vector<JointVector> taken;
-  for (const std::size_t i : independent_observations()) {
-    information += view_information(model, observations_[i].view.base_T_flange);
-    taken.push_back(observations_[i].joints_rad);
+  for (std::size_t k = 0; k < counted.size(); ++k) {
+    const Observation& o = observations_[counted[k]];
+    const bool same = k > 0 && observations_[counted[k - 1]].view.station == o.view.station;
+    if (!same) taken.push_back(o.joints_rad);
   }
   CalibrationViewOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.step = here.step;
   options.speed = limits_;
+  const bool fixed = config_.calibration.views == "fixed48";
+  options.wanted = fixed ? 0 : wanted_targets(*rough);
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
-  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, model, information, taken};
-  const bool fixed = config_.calibration.views == "fixed48";
+  const CalibrationViewInputs inputs{
+      arm_, envelope_body_, space, clearance, rough->models, information_of(*rough, counted), taken};
   CalibrationViewResult result;
-  const PredictedSigma sigma = predicted_sigma(rough->covariance.value_or(predicted_covariance(information)));
+  const PredictedSigma sigma = predicted_sigma(rough->covariance.value_or(predicted_hand_eye(inputs.information)));
   result.sigma_mm = 1000 * sigma.translation_m;
   result.sigma_mrad = 1000 * sigma.rotation_rad;
   const bool can_tell = rough->covariance.has_value() || !estimates_intrinsics();
-  result.target_met = can_tell && !fixed && result.sigma_mm <= config_.calibration.target_sigma_mm &&
-                      result.sigma_mrad <= config_.calibration.target_sigma_mrad;
   auto choice = fixed ? next_fixed_view(inputs, planner_, here.at_rad, fixed_next_, options)
                       : firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
   const auto found = [&] { return choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen; };
-  const bool too_few = observations_.size() < static_cast<std::size_t>(config_.calibration.views_min);
+  if (options.wanted != 0) {
+    // None of those that want views can be seen from anywhere else: they are not asked for again.
+    const std::uint32_t sought = found() ? choice->shown & options.wanted : options.wanted;
+    for (std::size_t m = 0; m < rough->targets.size(); ++m) {
+      if ((sought >> m & 1U) == 0) continue;
+      int& tries = sought_[static_cast<std::size_t>(rough->targets[m])];
+      tries = found() ? tries + 1 : std::numeric_limits<int>::max();
+    }
+    if (!found()) {
+      options.wanted = 0;
+      choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
+    }
+  }
+  result.target_met = can_tell && !fixed && options.wanted == 0 &&
+                      result.sigma_mm <= config_.calibration.target_sigma_mm &&
+                      result.sigma_mrad <= config_.calibration.target_sigma_mrad;
+  const bool too_few = stops() < static_cast<std::size_t>(config_.calibration.views_min);
   if (!found() && too_few) {
     options.different_min_rad = kCrowded_rad;  // few places see the board: views side by side are better than none
     choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
@@ -166,13 +250,14 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
 
 SolveResult Workbench::solve() {
   SolveResult result;
-  const auto solved = solve_hand_eye(color_.intrinsics(), board_, views(), solve_options());
+  const auto solved = solve_hand_eye(color_.intrinsics(), boards_, views(), solve_options());
   if (!solved) {
     result.fault = solved.error().fault;
     return result;
   }
   hand_eye_ = *solved;
   result.solved = true;
+  result.targets = solved_targets();
   const Eigen::Vector3d t = solved->flange_T_camera.translation();
   const Eigen::Quaterniond q = solved->flange_T_camera.quaternion();
   result.translation_m = {t.x(), t.y(), t.z()};
@@ -194,7 +279,7 @@ SolveResult Workbench::solve() {
 ValidateResult Workbench::validate() {
   ValidateResult result;
   if (!hand_eye_) return result;
-  validate_hand_eye(color_.intrinsics(), board_, views(), solve_options(), *hand_eye_);
+  validate_hand_eye(color_.intrinsics(), boards_, views(), solve_options(), *hand_eye_);
   result.accepted = hand_eye_->verdict == Verdict::kAccepted;
   result.holdout_rms_px = hand_eye_->holdout_rms_px;
   result.usable_distance_m = hand_eye_->usable_distance_m;
@@ -203,6 +288,18 @@ ValidateResult Workbench::validate() {
     result.clearance_m = mapping_terms_->voxels_m;
   }
   return result;
+}
+
+void Workbench::reproject(const CalibrationView& view, CalibrationViewRecord& record) const {
+  const auto& base_T_board = hand_eye_->targets[static_cast<std::size_t>(view.target)].base_T_board;
+  const auto camera_T_board = (view.base_T_flange * hand_eye_->flange_T_camera).inverse() * base_T_board;
+  double sum = 0;
+  for (std::size_t c = 0; c < view.corners_px.size(); ++c) {
+    const auto pixel = project(camera(), camera_T_board * board(view.target).corner(point_of(view.ids, c)));
+    record.reprojected_px.push_back(pixel.value_or(Eigen::Vector2d(-1, -1)));
+    sum += (view.corners_px[c] - record.reprojected_px.back()).squaredNorm();
+  }
+  record.rms_px = std::sqrt(sum / (2.0 * static_cast<double>(view.corners_px.size())));
 }
 
 std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
@@ -214,6 +311,10 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
     const auto k = static_cast<std::size_t>(place - counted.begin());  // its number in the solve
     const Observation& o = observations_[i];
     CalibrationViewRecord r;
+    const auto target = static_cast<std::size_t>(o.view.target);
+    if (targets_.size() > 1) r.name = fmt::format("{:.0f} s, {}", o.time_s, targets_[target].name);
+    r.target = o.view.target;
+    r.station = o.view.station;
     r.time_s = o.time_s;
     r.joints_rad = o.joints_rad;
     r.base_T_flange = o.view.base_T_flange;
@@ -225,21 +326,12 @@ std::vector<CalibrationViewRecord> Workbench::calibration_records() const {
       r.counted = place != counted.end();
       if (k < hand_eye_->fits.size()) r.used = hand_eye_->fits[k].used;
       if (k < hand_eye_->holdout_px.size()) r.holdout_px = hand_eye_->holdout_px[k];
-      const auto camera_T_board =
-          (o.view.base_T_flange * hand_eye_->flange_T_camera).inverse() * hand_eye_->base_T_board;
-      for (std::size_t c = 0; c < o.view.corners_px.size(); ++c) {
-        const auto pixel = project(camera, camera_T_board * board_.corner(point_of(o.view.ids, c)));
-        r.reprojected_px.push_back(pixel.value_or(Eigen::Vector2d(-1, -1)));
-      }
-      double sum = 0;
-      for (std::size_t c = 0; c < r.detected_px.size(); ++c) {
-        sum += (r.detected_px[c] - r.reprojected_px[c]).squaredNorm();
-      }
-      r.rms_px = std::sqrt(sum / (2.0 * static_cast<double>(r.detected_px.size())));
+      if (target < hand_eye_->targets.size() && hand_eye_->targets[target].views > 0) reproject(o.view, r);
     }
     const std::size_t pixels = gray_.size();
-    if ((i + 1) * pixels <= pictures_.size()) {
-      const auto from = pictures_.items().subspan(i * pixels, pixels);
+    const auto stop = static_cast<std::size_t>(o.view.station);
+    if ((stop + 1) * pixels <= pictures_.size()) {
+      const auto from = pictures_.items().subspan(stop * pixels, pixels);
       if (std::any_of(from.begin(), from.end(), [](std::uint8_t v) { return v != 0; })) {
         r.picture = {camera.width, camera.height, {from.begin(), from.end()}};
       }

@@ -119,16 +119,20 @@ std::vector<CameraPlace> Workbench::camera_places() const {
   return places;
 }
 
-std::optional<std::array<Eigen::Vector3d, 4>> Workbench::board_outline_m() const {
-  if (!hand_eye_) return std::nullopt;
-  const double s = board_.square_size_m;
-  const double width = (board_.inner_columns - 1) * s, height = (board_.inner_rows - 1) * s;
-  std::array<Eigen::Vector3d, 4> corners;
-  // The printed squares reach one square beyond the inner corners.
-  const std::array<Eigen::Vector3d, 4> on_board = {
-      {{-s, -s, 0}, {width + s, -s, 0}, {width + s, height + s, 0}, {-s, height + s, 0}}};
-  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = hand_eye_->base_T_board * on_board[i];
-  return corners;
+std::vector<std::array<Eigen::Vector3d, 4>> Workbench::board_outlines_m() const {
+  std::vector<std::array<Eigen::Vector3d, 4>> outlines;
+  for (std::size_t k = 0; hand_eye_ && k < hand_eye_->targets.size(); ++k) {
+    if (hand_eye_->targets[k].views == 0) continue;
+    const BoardSpec& board = boards_[k];
+    const double s = board.square_size_m;
+    const double width = (board.inner_columns - 1) * s, height = (board.inner_rows - 1) * s;
+    // The printed squares reach one square beyond the inner corners.
+    std::array<Eigen::Vector3d, 4> corners = {
+        {{-s, -s, 0}, {width + s, -s, 0}, {width + s, height + s, 0}, {-s, height + s, 0}}};
+    for (Eigen::Vector3d& corner : corners) corner = hand_eye_->targets[k].base_T_board * corner;
+    outlines.push_back(corners);
+  }
+  return outlines;
 }
 
 }  // namespace firstlook

@@ -1,5 +1,7 @@
 /// Jobs that test a stored calibration: where to look from, and whether it holds.
 #include <algorithm>
+#include <numeric>
+#include <set>
 
 #include "algorithms/calibration/verification.hpp"
 #include "app/jobs/workbench.hpp"
@@ -26,7 +28,9 @@ HandEyeResult result_of(const StoredCalibration& stored, double tolerance_m) {
 
 std::vector<PosePair> pairs_of(std::span<const Observation> observations) {
   std::vector<PosePair> pairs;
-  for (const Observation& o : observations) pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board});
+  for (const Observation& o : observations) {
+    pairs.push_back({o.view.base_T_flange, o.pose.camera_T_board, o.view.target, o.view.station});
+  }
   return pairs;
 }
 
@@ -49,8 +53,19 @@ HandEyeClaim Workbench::claim() const {
            std::max(stored.arm_sigma.rotation_rad, config_.calibration.robot_sigma_mrad * 1e-3)}};
 }
 
-std::optional<Path> Workbench::best_verification_view(const FromHere& here, const ViewDesignModel& model,
-                                                      const Matrix12d& information) {
+Workbench::RoughModel Workbench::claimed_model(const HandEyeClaim& stated) const {
+  RoughModel rough;
+  ViewDesignModel model;
+  model.camera = camera();
+  model.flange_T_camera = stated.flange_T_camera;
+  model.corner_sigma_px = stated.corner_sigma_px;
+  model.arm_sigma = stated.arm_sigma;
+  place_targets(model, pairs_of(observations_), {}, rough);
+  return rough;
+}
+
+std::optional<Path> Workbench::best_verification_view(const FromHere& here, const RoughModel& rough,
+                                                      const Eigen::MatrixXd& information) {
   std::vector<JointVector> taken;
   for (const Observation& o : observations_) taken.push_back(o.joints_rad);
   CalibrationViewOptions options;
@@ -61,7 +76,7 @@ std::optional<Path> Workbench::best_verification_view(const FromHere& here, cons
   options.limits.margin_px = 60;  // 5 mm and 1 degree move the board by 15 px at 0.6 m
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
-  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, model, information, taken};
+  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, rough.models, information, taken};
   const auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
   if (!choice || choice->outcome != CalibrationViewChoice::Outcome::kChosen) return std::nullopt;
   return choice->path;
@@ -90,23 +105,22 @@ VerificationViewResult Workbench::next_verification_view(const FromHere& here) {
   std::optional<Path> path;
   if (!observations_.empty()) {
     const HandEyeClaim stated = claim();
-    const ViewDesignModel model{camera(),
-                                board_,
-                                stated.flange_T_camera,
-                                mean_board_pose(pairs_of(observations_), stated.flange_T_camera),
-                                stated.corner_sigma_px,
-                                stated.arm_sigma};
-    Matrix12d information = prior_information();
-    for (const Observation& o : observations_) information += view_information(model, o.view.base_T_flange);
+    const RoughModel rough = claimed_model(stated);
+    std::vector<std::size_t> all(observations_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    const Eigen::MatrixXd information = information_of(rough, all);
     const VerificationLimits limits = limits_of(config_);
-    if (const auto views = static_cast<int>(observations_.size()); views >= limits.views_min) {
+    if (static_cast<int>(stops()) >= limits.views_min) {
+      std::set<int> seen;
+      for (const Observation& o : observations_) seen.insert(o.view.target);
+      const auto alike = static_cast<int>(observations_.size() + 1 - seen.size());
       const DetectableError detectable =
-          detectable_error(predicted_covariance(information), stated.covariance, views, limits);
+          detectable_error(predicted_hand_eye(information), stated.covariance, alike, limits);
       result.target_met = detectable.within(limits);
       result.detectable_mm = 1000 * detectable.translation_m;
       result.detectable_mrad = 1000 * detectable.rotation_rad;
     }
-    if (verification_looks_ == observations_.size()) path = best_verification_view(here, model, information);
+    if (verification_looks_ == stops()) path = best_verification_view(here, rough, information);
   }
   if (!path) path = next_turn(here);
   result.found = path.has_value();
@@ -121,11 +135,10 @@ VerifyResult Workbench::verify_calibration() {
   hand_eye.reasons = covariance_reasons(solve_options().limits, hand_eye);
   std::vector<CalibrationView> views;
   for (const Observation& o : observations_) views.push_back(o.view);
-  const auto verification = verify_hand_eye(camera(), board_, views, claim(), limits_of(config_));
+  const auto verification = verify_hand_eye(camera(), boards_, views, claim(), limits_of(config_));
   if (verification) {
     record.verification = *verification;
-    hand_eye.base_T_board = verification->base_T_board;
-    hand_eye.board_covariance = verification->board_covariance;
+    hand_eye.targets = verification->targets;
     hand_eye.holdout_rms_px = verification->residual_rms_px;
     hand_eye.holdout_rms_m = verification->residual_rms_m;
     hand_eye.reasons.insert(hand_eye.reasons.end(), verification->reasons.begin(), verification->reasons.end());
@@ -133,19 +146,29 @@ VerifyResult Workbench::verify_calibration() {
     result.chi2_limit = verification->chi2_limit;
     result.residual_rms_px = verification->residual_rms_px;
   } else {
-    if (!observations_.empty()) {
-      hand_eye.base_T_board = mean_board_pose(pairs_of(observations_), hand_eye.flange_T_camera);
+    hand_eye.targets.resize(boards_.size());
+    for (std::size_t k = 0; k < boards_.size(); ++k) {
+      const auto own = pairs_of_target(pairs_of(observations_), static_cast<int>(k));
+      if (own.empty()) continue;
+      hand_eye.targets[k].views = static_cast<int>(own.size());
+      hand_eye.targets[k].base_T_board = mean_board_pose(own, hand_eye.flange_T_camera);
     }
     hand_eye.reasons.emplace_back(verification.error().detail());
   }
-  if (const std::size_t missed = verification_looks_ - observations_.size(); missed > 0 && !hand_eye.reasons.empty()) {
+  if (const std::size_t missed = verification_looks_ - stops(); missed > 0 && !hand_eye.reasons.empty()) {
     hand_eye.reasons.push_back(fmt::format("{} of {} looks did not show the board", missed, verification_looks_));
+  }
+  const auto first = std::ranges::find_if(hand_eye.targets, [](const TargetPose& t) { return t.views > 0; });
+  if (first != hand_eye.targets.end()) {
+    hand_eye.base_T_board = first->base_T_board;
+    hand_eye.board_covariance = first->covariance;
   }
   result.accepted = hand_eye.reasons.empty();
   hand_eye.verdict = result.accepted ? Verdict::kAccepted : Verdict::kRejected;
   record.calibration.accepted = result.accepted;
   hand_eye_ = std::move(hand_eye);
   verified_ = std::move(record);
+  result.targets = solved_targets();
   if (result.accepted) {
     begin_mapping();
     result.clearance_m = mapping_terms_->voxels_m;

@@ -69,7 +69,8 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       color_(color),
       depth_(depth),
       workers_(workers),
-      board_(board_of(config.board).value_or(BoardSpec{})),  // load_config has refused what is no board
+      targets_(targets_of(config).value_or(std::vector<NamedTarget>(1))),  // load_config has refused what is none
+      boards_(boards_of(targets_)),
       limits_{config.arm.speed_max_m_s, config.arm.speed_max_rad_s, config.arm.acceleration_rad_s2},
       zone_cylinder_{config.safe_zone.radius_m, config.safe_zone.height_m, config.cart.top_m},
       envelope_body_(body_with_envelope(arm, config.camera_envelope_radius_m)),
@@ -91,7 +92,10 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
   }
   for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});
   mapping_views_.reserve(kViewRecordsMax);
-  observations_.reserve(static_cast<std::size_t>(config.calibration.views_max) + 1);
+  identify_reference_.resize(boards_.size());
+  located_.resize(boards_.size());
+  sought_.resize(boards_.size());
+  observations_.reserve((static_cast<std::size_t>(config.calibration.views_max) + 1) * boards_.size());
   way_sights_.reserve(kWaySightsMax);
   begin_alignment();
   publish_blind(0);
@@ -109,10 +113,16 @@ Status Workbench::take_memory() {
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
-  const std::size_t point = sizeof(Eigen::Vector2d) + (board_.allows_partial_views() ? sizeof(int) : 0);
-  const std::size_t view = sizeof(Observation) + static_cast<std::size_t>(board_.corners()) * point;
-  const std::size_t way_sight = sizeof(WaySight) + decltype(WayArguments::joints)::capacity() * sizeof(JointSample) +
-                                static_cast<std::size_t>(board_.corners()) * point;
+  // A stop may show every target, a frame on the way counts for one of them.
+  std::size_t view = 0, points_max = 0;
+  for (const BoardSpec& board : boards_) {
+    const std::size_t point = sizeof(Eigen::Vector2d) + (board.allows_partial_views() ? sizeof(int) : 0);
+    const std::size_t points = static_cast<std::size_t>(board.corners()) * point;
+    view += sizeof(Observation) + points;
+    points_max = std::max(points_max, points);
+  }
+  const std::size_t way_sight =
+      sizeof(WaySight) + decltype(WayArguments::joints)::capacity() * sizeof(JointSample) + points_max;
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
            std::pair{memory::Pool::kDistanceField,

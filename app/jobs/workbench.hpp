@@ -41,7 +41,8 @@ struct CellFacts {
   std::optional<StoredCalibration> stored;  ///< of an earlier job; for scopes that verify it
 };
 
-/// One stop at which the board was seen for the calibration.
+/// A target as it was seen from one stop of the calibration. Those of one stop have the same number of it, their
+/// `view.station`, and stand together.
 struct Observation {
   JointVector joints_rad;
   double time_s = 0;
@@ -49,11 +50,12 @@ struct Observation {
   BoardPose pose;
   double residual_rms_px = 0;
   SettlingRecord settling;
-  std::optional<BoardPlane> plane;  ///< of the board in depth frames of this stop
+  std::optional<BoardPlane> plane;  ///< of the target in depth frames of this stop
 };
 
-/// What was seen of the board on the way between two stops.
+/// What was seen of a target on the way between two stops.
 struct WaySight {
+  int target = 0;
   std::vector<JointSample> joints;
   double color_stamp_s = 0;  ///< as the camera has it
   CornerSet corners;
@@ -64,9 +66,19 @@ struct WaySight {
 
 /// What the frames of one look show.
 struct BoardSight {
-  std::optional<StandingPicture> picture;  ///< empty: no board to be used
+  struct Target {
+    int target = 0;
+    StandingPicture picture;
+  };
+  std::vector<Target> targets;  ///< empty: no board to be used
   bool still = true;
   double moved_px = 0;
+};
+
+/// Where a target was seen before the calibration: places it as soon as the camera's place is roughly known.
+struct LocatedTarget {
+  Transform<Base, Flange> base_T_flange;
+  Transform<Camera, Board> camera_T_board;
 };
 
 /// Around the arm in depth images: the thesis's self filter.
@@ -120,9 +132,10 @@ class Workbench {
   [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
   [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
   [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
-  /// Where the camera stood at each of `mapping_views()`; the outermost corners of the board. For pictures.
+  /// Where the camera stood at each of `mapping_views()`; the outermost corners of each board. For pictures.
   [[nodiscard]] std::vector<CameraPlace> camera_places() const;
-  [[nodiscard]] std::optional<std::array<Eigen::Vector3d, 4>> board_outline_m() const;
+  [[nodiscard]] std::vector<std::array<Eigen::Vector3d, 4>> board_outlines_m() const;
+  [[nodiscard]] const std::vector<NamedTarget>& targets() const { return targets_; }
   [[nodiscard]] const ArmModel& arm() const { return arm_; }
   [[nodiscard]] PublishedSpace& published() { return published_; }
   [[nodiscard]] double last_stamp_s() const { return last_stamp_s_; }
@@ -157,6 +170,8 @@ class Workbench {
   void align_sensors();
   void align_depth_camera();
   void align_stamps();
+  [[nodiscard]] int target_on_the_way() const;
+  [[nodiscard]] Matrix12d covariance_with(int target) const;
   [[nodiscard]] DepthMount stated_mount() const;
   [[nodiscard]] const Transform<Camera, Depth>& camera_T_depth() const {
     return alignment_.depth_camera.mount.camera_T_depth;
@@ -164,28 +179,54 @@ class Workbench {
   [[nodiscard]] StampOffsets stamp_offsets() const {
     return {alignment_.color_stamps.offset_s, alignment_.depth_stamps.offset_s};
   }
-  [[nodiscard]] Result<BoardPlane> plane_of(const hal::Frame& frame, const Transform<Camera, Board>& camera_T_board);
-  [[nodiscard]] std::optional<BoardPlane> plane_beside(const DetectArguments& arguments, const BoardPose& pose);
+  [[nodiscard]] Result<BoardPlane> plane_of(const hal::Frame& frame, int target,
+                                            const Transform<Camera, Board>& camera_T_board);
+  [[nodiscard]] std::optional<BoardPlane> plane_beside(const DetectArguments& arguments, int target,
+                                                       const BoardPose& pose);
   [[nodiscard]] std::optional<SeenPose> seen_pose(const WaySight& sight) const;
-  [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame);
+  /// Reads the frame's pixels, unless the camera finds the corners itself.
+  [[nodiscard]] Status read_picture(const hal::Frame& frame);
+  [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame, int target);
   [[nodiscard]] BoardSight sight_of(const DetectArguments& arguments);
-  void keep_picture(std::size_t observation);
+  void keep_picture(std::size_t stop);
+  void observe(std::size_t stop, const DetectArguments& arguments, const BoardSight& sight,
+               const BoardSight::Target& seen, const BoardPose& pose);
   void settle_observations(BoardLook purpose);
+  /// How many stops showed a target.
+  [[nodiscard]] std::size_t stops() const;
+  [[nodiscard]] const BoardSpec& board(int target) const { return boards_[static_cast<std::size_t>(target)]; }
+  [[nodiscard]] TargetMask solved_targets() const;
+  struct BoardShift {
+    double shift_m = 0;
+    double limit_m = 0;
+  };
+  [[nodiscard]] BoardShift shift_of(int target, const BoardPose& pose,
+                                    const Transform<Base, Flange>& base_T_flange) const;
   /// What the views taken so far say; the covariance only where intrinsics are estimated and could be.
   struct RoughModel {
-    ViewDesignModel model;
+    std::vector<ViewDesignModel> models;  ///< one for each target whose place is known or likely
+    std::vector<int> targets;             ///< that they are of
     std::optional<Matrix6d> covariance;
   };
+  void place_targets(const ViewDesignModel& common, const std::vector<PosePair>& pairs,
+                     std::span<const TargetPose> refined, RoughModel& rough) const;
+  /// Information of the observations named, about the targets of the models.
+  [[nodiscard]] Eigen::MatrixXd information_of(const RoughModel& rough,
+                                               std::span<const std::size_t> observations) const;
+  /// Of the models, those whose targets want more views.
+  [[nodiscard]] std::uint32_t wanted_targets(const RoughModel& rough) const;
   [[nodiscard]] std::optional<RoughModel> rough_model() const;
   [[nodiscard]] bool estimates_intrinsics() const { return config_.calibration.intrinsics == "estimate"; }
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
   [[nodiscard]] ArmSigma arm_sigma_expected() const;
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
+  void reproject(const CalibrationView& view, CalibrationViewRecord& record) const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
   [[nodiscard]] HandEyeClaim claim() const;
-  [[nodiscard]] std::optional<Path> best_verification_view(const FromHere& here, const ViewDesignModel& model,
-                                                           const Matrix12d& information);
+  [[nodiscard]] RoughModel claimed_model(const HandEyeClaim& stated) const;
+  [[nodiscard]] std::optional<Path> best_verification_view(const FromHere& here, const RoughModel& rough,
+                                                           const Eigen::MatrixXd& information);
   [[nodiscard]] std::optional<Path> next_turn(const FromHere& here);
   [[nodiscard]] bool is_frozen(const hal::Frame& frame, IntegrateResult& result);
   void begin_mapping();
@@ -200,7 +241,8 @@ class Workbench {
   hal::ColorCamera& color_;
   hal::DepthCamera& depth_;
   WorkerPool& workers_;
-  BoardSpec board_;
+  std::vector<NamedTarget> targets_;
+  std::vector<BoardSpec> boards_;  ///< of them
   SpeedLimits limits_;
   SafeZone zone_cylinder_;
 
@@ -218,7 +260,9 @@ class Workbench {
   memory::PoolBuffer<std::uint8_t> pictures_;  ///< one for each observation
   std::vector<memory::PoolShare> shares_;
 
-  std::optional<BoardPose> identify_reference_;
+  std::vector<std::optional<BoardPose>> identify_reference_;  ///< by target, where a board was seen first
+  std::vector<std::optional<LocatedTarget>> located_;         ///< by target
+  std::vector<int> sought_;  ///< by target: views that were to show it for its own sake
   std::vector<Observation> observations_;
   std::vector<WaySight> way_sights_;
   AlignmentRecord alignment_;

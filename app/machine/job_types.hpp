@@ -204,8 +204,12 @@ struct WayResult {
   }
 };
 
+/// Which of the targets that the job looks for: bit k is target k.
+using TargetMask = std::uint16_t;
+
 struct DetectResult {
   bool found = false;
+  TargetMask targets = 0;  ///< that were found; what follows is of the first of them
   double rms_px = 0;
   std::array<double, 3> camera_p_board_m{};     ///< origin of the board in the camera
   std::array<double, 4> camera_q_board_xyzw{};  ///< rotation of the board in the camera
@@ -214,7 +218,7 @@ struct DetectResult {
   double moved_px = 0;                          ///< from frame to frame, see standing_picture.hpp
   template <typename Archive>
   void fields(Archive& a) {
-    a(found, rms_px, camera_p_board_m, camera_q_board_xyzw, changed, still, moved_px);
+    a(found, targets, rms_px, camera_p_board_m, camera_q_board_xyzw, changed, still, moved_px);
   }
 };
 
@@ -243,10 +247,11 @@ struct SolveResult {
   double depth_moved_mrad = 0;
   StampOffsets offsets;
   bool stamps_wrong = false;  ///< frames on the way fit no offset that is looked for
+  TargetMask targets = 0;     ///< whose place was solved
   template <typename Archive>
   void fields(Archive& a) {
-    a(solved, fault, translation_m, quaternion_xyzw, sigma_mm, sigma_mrad, reprojection_rms_px, depth_estimated,
-      depth_moved_mm, depth_moved_mrad, offsets, stamps_wrong);
+    a(targets, solved, fault, translation_m, quaternion_xyzw, sigma_mm, sigma_mrad, reprojection_rms_px,
+      depth_estimated, depth_moved_mm, depth_moved_mrad, offsets, stamps_wrong);
   }
 };
 
@@ -280,9 +285,10 @@ struct VerifyResult {
   double residual_rms_px = 0;
   double clearance_m = 0;  ///< of safety rule 5, with this calibration
   StampOffsets offsets;    ///< as stored with it
+  TargetMask targets = 0;  ///< whose place the test gives
   template <typename Archive>
   void fields(Archive& a) {
-    a(accepted, chi2, chi2_limit, residual_rms_px, clearance_m, offsets);
+    a(accepted, targets, chi2, chi2_limit, residual_rms_px, clearance_m, offsets);
   }
 };
 
@@ -325,9 +331,9 @@ struct NextViewResult {  ///< kNextSweepView, kNextView
 };
 
 struct CheckBoardResult {
-  bool seen = false;
-  bool moved = false;
-  double shift_mm = 0;
+  TargetMask seen = 0;   ///< of those whose place is known
+  TargetMask moved = 0;  ///< of those that were seen
+  double shift_mm = 0;   ///< of the one that moved farthest beyond its limit
   double limit_mm = 0;
   bool still = true;  ///< false: the picture moved between the frames
   double moved_px = 0;

@@ -22,6 +22,7 @@ struct MachineSettings {
   StartSource start_source = StartSource::kPendant;
   double settle_time_s = 0.2;
   int frames_per_view = 3;
+  int targets = 1;  ///< that are looked for
   int calibration_views_min = 8;
   int calibration_views_max = 30;
   int verify_views = 3;        ///< views of the board that a stored calibration is tested on at least
@@ -36,10 +37,16 @@ struct MachineSettings {
   JointVector parking_rad;  ///< where the job ends; inside the safe zone
 };
 
+/// A place of the arm from which targets were seen.
+struct TargetView {
+  JointVector at_rad;
+  TargetMask targets = 0;
+};
+
 /// What the machine remembers of the job, apart from the state itself.
 struct Progress {
   ViewList views;                  ///< of LocateBoard, later of IdentifyLink
-  std::uint32_t view = 0;          ///< position in `views`
+  std::uint32_t view = 0;          ///< position in `views`, in VerifyBoard in `target_views`
   std::uint32_t observations = 0;  ///< views of the board taken for the calibration
   std::uint32_t failed_looks = 0;  ///< in a row, at calibration views
   std::uint32_t still_images = 0;  ///< joints that moved without moving the image
@@ -49,7 +56,12 @@ struct Progress {
   std::uint32_t replans = 0;        ///< in a row, without a view between
   std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
   bool calibration_accepted = false;
-  JointVector board_view_rad;       ///< where the board was seen first; looked at again at the end
+  JointVector board_view_rad;  ///< where a board was seen first
+  /// Places from which targets were seen first, each target once: they are looked at again at the end.
+  FixedVector<TargetView, kViewListMax> target_views;
+  TargetMask located = 0;           ///< targets that `target_views` show
+  TargetMask relevant = 0;          ///< those that the calibration rests on
+  TargetMask standing = 0;          ///< those that stood at the end where they stood before
   StateId resume = StateId::kNone;  ///< where a pause came from
   Instant paused_at{};
   Instant played_at{};

@@ -85,18 +85,19 @@ void mark_places(MapPicture& p, const MapProjection& projection, const MapPictur
     p.labels.push_back({"axis", std::string(kNames[a]), end + 0.7 * p.text_px * (end - base).normalized()});
   }
   p.labels.push_back({"place", "arm base", base + Vector2d(0, 1.1 * p.text_px)});
-  if (!in.board_m) return;
-  MapPicture::Line outline{"board", {}};
-  Vector2d middle = Vector2d::Zero();
-  double lowest = 0;
-  for (const Vector3d& corner : *in.board_m) {
-    outline.points_px.push_back(projection.pixel(corner));
-    middle += outline.points_px.back() / 4;
-    lowest = std::max(lowest, outline.points_px.back().y());
+  for (const auto& board : in.boards_m) {
+    MapPicture::Line outline{"board", {}};
+    Vector2d middle = Vector2d::Zero();
+    double lowest = 0;
+    for (const Vector3d& corner : board) {
+      outline.points_px.push_back(projection.pixel(corner));
+      middle += outline.points_px.back() / 4;
+      lowest = std::max(lowest, outline.points_px.back().y());
+    }
+    outline.points_px.push_back(outline.points_px.front());
+    p.lines.push_back(std::move(outline));
+    p.labels.push_back({"place", "board", {middle.x(), lowest + 0.9 * p.text_px}});
   }
-  outline.points_px.push_back(outline.points_px.front());
-  p.lines.push_back(std::move(outline));
-  p.labels.push_back({"place", "board", {middle.x(), lowest + 0.9 * p.text_px}});
 }
 
 std::string style_of(const CameraPlace& place) { return place.phase == "sweep" ? "sweep" : "explore"; }
@@ -173,8 +174,8 @@ MapPicture views_in_order(const MapPictureInputs& in) {
     low = low.cwiseMin(place.position_m);
     high = high.cwiseMax(place.position_m);
   }
-  if (in.board_m) {
-    for (const Vector3d& corner : *in.board_m) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+  for (const auto& board : in.boards_m) {
+    for (const Vector3d& corner : board) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
   }
   const Vector3d margin(0.15, 0.15, 0);
   low -= margin;
@@ -237,9 +238,10 @@ MapPicture layer(const VoxelMap& map, const MapPictureInputs& in, double z_m, co
     p.lines.push_back({"axis-y", {base, pixel({0, kAxis_m})}});
     p.labels.push_back({"place", "arm base", base + Vector2d(0, 1.0 * p.text_px)});
   }
-  if (in.board_m && inside(in.board_m->front().head<2>())) {
+  for (const auto& corners : in.boards_m) {
+    if (!inside(corners.front().head<2>())) continue;
     MapPicture::Line board{"board", {}};
-    for (const Vector3d& corner : *in.board_m) board.points_px.push_back(pixel(corner.head<2>()));
+    for (const Vector3d& corner : corners) board.points_px.push_back(pixel(corner.head<2>()));
     board.points_px.push_back(board.points_px.front());
     p.labels.push_back({"place", "board", board.points_px.front() + Vector2d(0, -0.9 * p.text_px)});
     p.lines.push_back(std::move(board));

@@ -21,11 +21,11 @@ struct CameraPlace {
 };
 
 struct MapPictureInputs {
-  const VoxelMap& map;                                    ///< at the end
-  const VoxelMap* swept = nullptr;                        ///< as the sweep left it; null when the sweep did not end
-  std::span<const std::uint8_t> zone;                     ///< one byte for each voxel, not 0 in the reach of the arm
-  std::span<const CameraPlace> places;                    ///< in order; their numbers are those of views.csv
-  std::optional<std::array<Eigen::Vector3d, 4>> board_m;  ///< outermost corners, in base
+  const VoxelMap& map;                                     ///< at the end
+  const VoxelMap* swept = nullptr;                         ///< as the sweep left it; null when the sweep did not end
+  std::span<const std::uint8_t> zone;                      ///< one byte for each voxel, not 0 in the reach of the arm
+  std::span<const CameraPlace> places;                     ///< in order; their numbers are those of views.csv
+  std::vector<std::array<Eigen::Vector3d, 4>> boards_m{};  ///< outermost corners of each, in base
 };
 
 /// A part of the cell that has a name, as a box in base.

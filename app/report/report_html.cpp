@@ -38,6 +38,7 @@ std::string report_html(const RunRecord& record) {
   html += navigation(record);
   html += summary_section(record);
   html += hand_eye_section(record);
+  html += targets_section(record);
   html += calibration_views_section(record);
   html += map_section(record);
   html += remaining_section(record);

@@ -85,7 +85,9 @@ struct SettlingRecord {
 };
 
 struct CalibrationViewRecord {
-  std::string name;  ///< of recorded data: its image; empty in a run
+  std::string name;  ///< of recorded data: its image; of a run with several targets: time and target; else empty
+  int target = 0;    ///< which of several it shows
+  int station = -1;  ///< those of one place of the arm have the same number, and the same picture
   double time_s = 0;
   JointVector joints_rad;
   Transform<Base, Flange> base_T_flange;

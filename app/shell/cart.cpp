@@ -268,7 +268,7 @@ std::vector<MapPicture> Cart::with_map_pictures(Draw draw) const {
   const VoxelMap swept = bench_->map_after_sweep();
   const std::vector<CameraPlace> places = bench_->camera_places();
   return draw(MapPictureInputs{bench_->map(), bench_->swept() ? &swept : nullptr, bench_->zone(), places,
-                               bench_->board_outline_m()});
+                               bench_->board_outlines_m()});
 }
 
 RunRecord Cart::record() const {
@@ -283,6 +283,9 @@ RunRecord Cart::record() const {
   r.hand_eye = bench_->hand_eye();
   r.solver = config_.calibration.solver;
   r.intrinsics = bench_->camera();
+  if (bench_->targets().size() > 1) {
+    for (const NamedTarget& target : bench_->targets()) r.target_names.push_back(target.name);
+  }
   r.alignment = bench_->alignment();
   r.verified = bench_->verified();
   r.calibration_views = bench_->calibration_records();

@@ -1,5 +1,6 @@
 #include "app/shell/job_settings.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "app/config/load_config.hpp"
@@ -28,6 +29,7 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.start_source = config.start_source == "panel" ? StartSource::kPanel : StartSource::kPendant;
   s.settle_time_s = config.calibration.settle_time_s;
   s.frames_per_view = config.calibration.frames_per_view;
+  s.targets = std::max(1, static_cast<int>(config.boards.size()));
   s.calibration_views_min = config.calibration.views_min;
   s.calibration_views_max = config.calibration.views_max;
   s.verify_views = config.calibration.verify_views;

@@ -48,8 +48,9 @@ class ColorCamera : public FrameStream {
  public:
   /// Copies the frame's grey values into `image`, which has the size of intrinsics(). May be called on a job's thread.
   [[nodiscard]] virtual Status read(const Frame& frame, MutableGrayImage image) = 0;
-  /// Corners instead of pixels, for cameras that deliver them (`--sensor fast`); empty optional: use read().
-  [[nodiscard]] virtual std::optional<CornerObservation> read_corners(const Frame& frame) = 0;
+  /// Corners of one of the targets that the camera was told to look for, by its number, instead of pixels: for cameras
+  /// that deliver them (`--sensor fast`); empty optional: use read().
+  [[nodiscard]] virtual std::optional<CornerObservation> read_corners(const Frame& frame, int target) = 0;
 };
 
 class DepthCamera : public FrameStream {

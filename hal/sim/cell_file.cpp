@@ -16,6 +16,7 @@
 
 #include "algorithms/vision/camera_model.hpp"
 #include "algorithms/vision/target_names.hpp"
+#include "algorithms/vision/target_set.hpp"
 #include "hal/sim/built_in_cells.hpp"
 #include "hal/sim/random_cell.hpp"
 #include "hal/sim/triangulation.hpp"
@@ -263,11 +264,12 @@ Pose board_orientation(const Vector3d& faces, const Vector3d& center, double rol
   return pose;
 }
 
-void read_board(const Section& cell, Scene& scene) {
-  const Section board(cell.file(), cell.child("board"), "board",
-                      {"center_m", "faces", "roll_deg", "type", "inner_columns", "inner_rows", "square_size_m",
+BoardPlacement read_board(const Section& cell, const YAML::Node& node, const std::string& path) {
+  const Section board(cell.file(), node, path,
+                      {"name", "center_m", "faces", "roll_deg", "type", "inner_columns", "inner_rows", "square_size_m",
                        "mark_size_m", "dictionary", "first_id", "legacy", "white_margin_m", "thickness_m"});
-  BoardPlacement& placed = scene.board;
+  BoardPlacement placed;
+  placed.name = board.text_or("name", placed.name);
   TargetWords words;
   words.type = board.text_or("type", words.type);
   words.columns = board.integer_or("inner_columns", words.columns, 1, 85);
@@ -280,18 +282,41 @@ void read_board(const Section& cell, Scene& scene) {
   placed.white_margin_m = board.number_or("white_margin_m", placed.white_margin_m, 0, 1);
   placed.thickness_m = board.number_or("thickness_m", placed.thickness_m, 0.001, 0.2);
   const auto spec = target_from_words(words);
-  if (!spec) board.fail(cell.child("board"), "{}", spec.error().detail());
+  if (!spec) board.fail(node, "{}", spec.error().detail());
   placed.spec = *spec;
   const Vector3d faces = board.vector("faces"), center = board.vector("center_m");
-  if (faces.norm() < 1e-6) board.fail(board.child("faces"), "board.faces must not be zero");
+  if (faces.norm() < 1e-6) board.fail(board.child("faces"), "{} must not be zero", board.inside("faces"));
   if (faces.normalized().cross(Vector3d::UnitZ()).norm() < 0.1 && std::hypot(center.x(), center.y()) < 1e-6) {
     board.fail(board.child("center_m"), "a board that lies flat must stand beside the arm");
   }
   Pose pose = board_orientation(faces, center, board.number_or("roll_deg", 0, -360, 360) * kRadians);
   pose.translate(-placed.spec.center());
   placed.base_T_board = Transform<Base, Board>(pose);
-  scene.board_solid = scene.solids.size();
-  scene.solids.push_back(board_panel(placed));
+  return placed;
+}
+
+/// `board`, or the list `boards` of which each has a name and none can be taken for another.
+void read_boards(const Section& cell, Scene& scene) {
+  scene.boards.clear();
+  if (!cell.has("boards")) {
+    scene.boards.push_back(read_board(cell, cell.child("board"), "board"));
+  } else {
+    const YAML::Node list = cell.child("boards");
+    if (cell.has("board")) cell.fail(list, "a cell has either 'board' or 'boards'");
+    if (!list.IsSequence()) cell.fail(list, "boards must be a list");
+    std::vector<NamedTarget> targets;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const std::string path = fmt::format("boards[{}]", i);
+      scene.boards.push_back(read_board(cell, list[i], path));
+      if (!list[i]["name"]) cell.fail(list[i], "{}.name is missing", path);
+      targets.push_back({scene.boards.back().name, scene.boards.back().spec});
+    }
+    if (const Status distinct = check_distinct(targets); !distinct) cell.fail(list, "{}", distinct.error().detail());
+  }
+  for (BoardPlacement& placed : scene.boards) {
+    placed.solid = scene.solids.size();
+    scene.solids.push_back(board_panel(placed));
+  }
 }
 
 void read_intrinsics(const Section& parent, const char* key, CameraIntrinsics& camera) {
@@ -348,8 +373,8 @@ void read_light(const Section& cell, Scene& scene) {
 
 Scene read_cell(const std::string& name, const YAML::Node& root, std::uint64_t seed) {
   const Section cell(name, root, "",
-                     {"arm", "start_deg", "floor_m", "walls", "cart", "safe_zone", "board", "camera", "light", "solids",
-                      "regions", "keep_out"});
+                     {"arm", "start_deg", "floor_m", "walls", "cart", "safe_zone", "board", "boards", "camera", "light",
+                      "solids", "regions", "keep_out"});
   Scene scene;
   scene.name = name;
   scene.arm_model = cell.text_or("arm", scene.arm_model);
@@ -362,7 +387,7 @@ Scene read_cell(const std::string& name, const YAML::Node& root, std::uint64_t s
   }
   read_room(cell, scene);
   read_cart(cell, scene);
-  read_board(cell, scene);
+  read_boards(cell, scene);
   read_camera(cell, scene, *arm, seed);
   read_light(cell, scene);
   read_solids(cell, scene);
@@ -418,7 +443,7 @@ bool reaches_into(const SafeZone& zone, const Solid& solid) {
 
 Status check_cell(const Scene& scene) {
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
-    if (i != scene.board_solid && reaches_into(scene.safe_zone, scene.solids[i])) {
+    if (board_of_solid(scene, i) == nullptr && reaches_into(scene.safe_zone, scene.solids[i])) {
       return failure(Fault::kCellInvalid, "{}: '{}' reaches into the safe zone (radius {} m, height {} m)", scene.name,
                      scene.solids[i].name, scene.safe_zone.radius_m, scene.safe_zone.height_m);
     }

@@ -18,7 +18,7 @@ namespace firstlook::sim {
 /// The same from YAML text; `name` stands in front of errors and becomes the scene's name. Keys: hal/sim/README.md.
 [[nodiscard]] Result<Scene> parse_cell(std::string_view yaml, const std::string& name, std::uint64_t seed);
 
-/// Says why the arm could not work here: a solid other than the board within the safe zone. kCellInvalid.
+/// Says why the arm could not work here: a solid other than a board within the safe zone. kCellInvalid.
 [[nodiscard]] Status check_cell(const Scene& scene);
 
 }  // namespace firstlook::sim

@@ -41,13 +41,16 @@ class ColorFrame {
         tracer_(tracer),
         rays_(rays),
         base_T_camera_(base_T_camera.pose()),
-        board_T_camera_((scene.board.base_T_board.inverse() * base_T_camera).pose()),
-        board_normal_(-scene.board.base_T_board.rotation().col(2)),
         body_(exposure.body, base_T_camera_, base_T_camera.translation()),
         noise_(exposure.seed, exposure.frame, kGrayNoise),
         jitter_(exposure.seed, exposure.frame, kSampleJitter),
         gray_(rays.x.size()),
-        seen_(rays.x.size()) {}
+        seen_(rays.x.size()) {
+    for (const BoardPlacement& board : scene.boards) {
+      boards_.push_back(
+          {board, (board.base_T_board.inverse() * base_T_camera).pose(), -board.base_T_board.rotation().col(2)});
+    }
+  }
 
   void render(MutableGrayImage out) {
     trace_centers();
@@ -60,6 +63,19 @@ class ColorFrame {
   }
 
  private:
+  /// A board as the camera has it.
+  struct SeenBoard {
+    const BoardPlacement& placed;
+    Pose board_T_camera;
+    Vector3d normal;  ///< towards who looks at it
+
+    /// Where the ray (x, y, 1) meets its plane, in board coordinates.
+    [[nodiscard]] Vector3d meet(double x, double y) const {
+      const Vector3d d = board_T_camera.linear() * Vector3d(x, y, 1);
+      return board_T_camera.translation() - board_T_camera.translation().z() / d.z() * d;
+    }
+  };
+
   void aim(RayRow& row, std::size_t i, double x, double y) const {
     const Vector3d d = base_T_camera_.linear() * Vector3d(x, y, 1);
     row.x[i] = static_cast<float>(d.x()), row.y[i] = static_cast<float>(d.y()), row.z[i] = static_cast<float>(d.z());
@@ -80,18 +96,17 @@ class ColorFrame {
     }
   }
 
-  /// Where the ray (x, y, 1) meets the board's plane, in board coordinates.
-  [[nodiscard]] Vector3d on_board(double x, double y) const {
-    const Vector3d d = board_T_camera_.linear() * Vector3d(x, y, 1);
-    return board_T_camera_.translation() - board_T_camera_.translation().z() / d.z() * d;
+  [[nodiscard]] const SeenBoard* board_of(std::size_t solid) const {
+    const auto found = std::ranges::find_if(boards_, [&](const SeenBoard& b) { return b.placed.solid == solid; });
+    return found == boards_.end() ? nullptr : &*found;
   }
 
-  [[nodiscard]] Sample look_at_board(double x, double y) const {
-    const Vector3d at = on_board(x, y);
-    const float reflectance = board_reflectance(scene_.board, at.x(), at.y());
-    const Vector3d point = scene_.board.base_T_board * at;
-    return {brightness(reflectance, point, board_normal_),
-            static_cast<std::int32_t>(scene_.board_solid) * kFaces + (reflectance == kBlack ? kDark : kLight)};
+  [[nodiscard]] Sample look_at_board(const SeenBoard& board, double x, double y) const {
+    const Vector3d at = board.meet(x, y);
+    const float reflectance = board_reflectance(board.placed, at.x(), at.y());
+    const Vector3d point = board.placed.base_T_board * at;
+    return {brightness(reflectance, point, board.normal),
+            static_cast<std::int32_t>(board.placed.solid) * kFaces + (reflectance == kBlack ? kDark : kLight)};
   }
 
   [[nodiscard]] float brightness(double reflectance, const Vector3d& point, const Vector3d& normal) const {
@@ -108,7 +123,8 @@ class ColorFrame {
     if (row.solid[i] < 0) return {};
     const auto solid = static_cast<std::size_t>(row.solid[i]);
     const Vector3d normal(row.nx[i], row.ny[i], row.nz[i]);
-    if (solid == scene_.board_solid && normal.dot(board_normal_) > 0.999) return look_at_board(x, y);
+    const SeenBoard* board = board_of(solid);
+    if (board != nullptr && normal.dot(board->normal) > 0.999) return look_at_board(*board, x, y);
     const Vector3d point =
         base_T_camera_.translation() + static_cast<double>(row.t[i]) * Vector3d(row.x[i], row.y[i], row.z[i]);
     int axis = 0;
@@ -117,9 +133,8 @@ class ColorFrame {
             row.solid[i] * kFaces + 2 * axis + (normal[axis] > 0 ? 1 : 0)};
   }
 
-  [[nodiscard]] bool is_board(std::int32_t seen) const {
-    return seen >= 0 && static_cast<std::size_t>(seen / kFaces) == scene_.board_solid && seen % kFaces >= kLight;
-  }
+  /// Only a board's front has light and dark.
+  static bool is_board(std::int32_t seen) { return seen >= 0 && seen % kFaces >= kLight; }
 
   enum class Around { kUniform, kBoard, kEdge };
 
@@ -130,7 +145,7 @@ class ColorFrame {
       for (int dc = c > 0 ? -1 : 0; dc <= (c + 1 < rays_.camera.width ? 1 : 0); ++dc) {
         const std::int32_t other = seen_[rays_.index(c + dc, r + dr)];
         uniform = uniform && other == own;
-        board = board && is_board(other);
+        board = board && is_board(other) && other / kFaces == own / kFaces;
       }
     }
     return uniform ? Around::kUniform : board ? Around::kBoard : Around::kEdge;
@@ -171,14 +186,15 @@ class ColorFrame {
   }
 
   [[nodiscard]] float integrate_board(int c, int r) const {
+    const std::size_t pixel = rays_.index(c, r);
+    const SeenBoard& board = *board_of(static_cast<std::size_t>(seen_[pixel] / kFaces));
     float sum = 0;
     spread(c, r, kBoardSamples, [&](double x, double y) {
-      const Vector3d at = on_board(x, y);
-      sum += board_reflectance(scene_.board, at.x(), at.y());
+      const Vector3d at = board.meet(x, y);
+      sum += board_reflectance(board.placed, at.x(), at.y());
     });
-    const std::size_t pixel = rays_.index(c, r);
-    const Vector3d point = scene_.board.base_T_board * on_board(rays_.x[pixel], rays_.y[pixel]);
-    return brightness(sum / (kBoardSamples * kBoardSamples), point, board_normal_);
+    const Vector3d point = board.placed.base_T_board * board.meet(rays_.x[pixel], rays_.y[pixel]);
+    return brightness(sum / (kBoardSamples * kBoardSamples), point, board.normal);
   }
 
   [[nodiscard]] float integrate_traced(int c, int r, RayRow& row) const {
@@ -226,8 +242,8 @@ class ColorFrame {
   const Scene& scene_;
   const RayTracer& tracer_;
   const PixelRays& rays_;
-  const Pose base_T_camera_, board_T_camera_;
-  const Vector3d board_normal_;  ///< towards who looks at it
+  const Pose base_T_camera_;
+  std::vector<SeenBoard> boards_;
   const BodyImage body_;
   const PixelNoise noise_, jitter_;
   std::vector<float> gray_;

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <vector>
 
+#include "algorithms/vision/target_set.hpp"
+
 namespace firstlook::sim {
 namespace {
 
-enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kMount, kSwitch, kInterval };
+enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kMount, kSwitch, kNumber, kInterval };
 
 struct Knob {
   std::string_view name;
@@ -39,6 +41,7 @@ constexpr std::array kKnobs = {
     Knob{"operator.pause_at", Kind::kInterval, &Faults::pause_s},
     Knob{"operator.stop_at", Kind::kTime, &Faults::stop_s},
     Knob{"board.move_at", Kind::kTime, &Faults::board_move_s},
+    Knob{"board.number", Kind::kNumber, &Faults::board_number},
     Knob{"board.absent", Kind::kSwitch, nullptr, &Faults::board_absent},
     Knob{"camera.fixed", Kind::kSwitch, nullptr, &Faults::camera_fixed},
     Knob{"obstacle.appear_at", Kind::kTime, &Faults::obstacle_s},
@@ -93,6 +96,10 @@ bool set_knob(const Knob& knob, std::string_view text, Faults& faults) {
       break;
     case Kind::kMount:
       if (!read_number(text, number) || std::abs(number) > 50) return false;
+      break;
+    case Kind::kNumber:
+      if (!read_number(text, number) || number < 1 || number > kTargetsMax || number != std::floor(number))
+        return false;
       break;
     case Kind::kInterval: {
       const std::size_t colon = text.find(':');

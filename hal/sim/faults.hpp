@@ -34,7 +34,8 @@ struct Faults {
   double pause_duration_s = kNever;
   double stop_s = kNever;        ///< operator.stop_at
   double board_move_s = kNever;  ///< board.move_at: slides by 3 cm and turns by 3 degrees
-  bool board_absent = false;     ///< board.absent=1
+  double board_number = 1;       ///< board.number: which of the boards moves, counted from 1
+  bool board_absent = false;     ///< board.absent=1: no board hangs in the cell
   bool camera_fixed = false;     ///< camera.fixed=1: it stands beside the arm
   double obstacle_s = kNever;    ///< obstacle.appear_at: a box appears in reach
 };

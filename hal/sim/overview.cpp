@@ -46,9 +46,9 @@ class OverviewPainter {
 
  private:
   [[nodiscard]] Vector3d color_of(std::size_t solid, const Vector3d& point) const {
-    if (solid == scene_.board_solid) {
-      const Vector3d at = scene_.board.base_T_board.inverse() * point;
-      return Vector3d::Constant(at.z() < 1e-4 ? board_reflectance(scene_.board, at.x(), at.y()) : 0.85);
+    if (const BoardPlacement* board = board_of_solid(scene_, solid)) {
+      const Vector3d at = board->base_T_board.inverse() * point;
+      return Vector3d::Constant(at.z() < 1e-4 ? board_reflectance(*board, at.x(), at.y()) : 0.85);
     }
     const auto& c = scene_.solids[solid].surface.color;
     return {c[0], c[1], c[2]};

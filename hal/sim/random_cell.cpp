@@ -103,7 +103,7 @@ class Layout {
     group.safe_zone = scene_.safe_zone;
     group.safe_zone.radius_m += kZoneMargin_m;
     group.solids = solids;
-    group.board_solid = solids.size();  // none of them
+    group.boards.clear();
     if (!check_cell(group)) return false;
     const std::array<float, 3> c = color();
     for (Solid& solid : solids) {
@@ -181,10 +181,11 @@ class Layout {
     const double height = post.z() - kFloor_m;
     scene_.solids.push_back(
         upright_cylinder("board's post", {post.x(), post.y(), kFloor_m + 0.5 * height}, 0.015, height));
-    pose.translate(-scene_.board.spec.center());
-    scene_.board.base_T_board = Transform<Base, Board>(pose);
-    scene_.board_solid = scene_.solids.size();
-    scene_.solids.push_back(board_panel(scene_.board));
+    BoardPlacement& placed = scene_.boards.front();
+    pose.translate(-placed.spec.center());
+    placed.base_T_board = Transform<Base, Board>(pose);
+    placed.solid = scene_.solids.size();
+    scene_.solids.push_back(board_panel(placed));
   }
 
   void light() {
@@ -220,8 +221,8 @@ Transform<Base, Camera> camera_pose(const Scene& scene, const LinkFrames& frames
 
 /// Angle between the board's normal and the line of sight to its middle.
 double view_tilt_rad(const Scene& scene, const Transform<Base, Camera>& base_T_camera) {
-  const Transform<Base, Board>& board = scene.board.base_T_board;
-  const Vector3d sight = (board * scene.board.spec.center() - base_T_camera.translation()).normalized();
+  const Transform<Base, Board>& board = scene.boards.front().base_T_board;
+  const Vector3d sight = (board * scene.boards.front().spec.center() - base_T_camera.translation()).normalized();
   return std::acos(std::clamp(sight.dot(board.rotation().col(2)), -1.0, 1.0));
 }
 
@@ -299,7 +300,7 @@ Result<Scene> make_random_cell(std::uint64_t cell_seed, std::uint64_t seed) {
     scene.mount.link_T_camera = assembled(scene.mount.link_T_camera, seed);
     const ArmModel arm = *find_arm_model(scene.arm_model);
     Scene with_margin = scene;
-    with_margin.board_solid = scene.solids.size();  // the board, too, stands outside
+    with_margin.boards.clear();  // the board, too, stands outside
     if (!check_cell(with_margin)) continue;
     if (!is_found_by_turning(scene, arm, Renderer(scene))) continue;
     const std::vector<JointVector> views = board_views(scene, kViewTries, cell_seed);

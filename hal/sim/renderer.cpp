@@ -83,9 +83,9 @@ bool Renderer::sees(const Vector3d& from_m, const Vector3d& to_m) const {
   return state_->tracer.distance_m(from_m, (to_m - from_m) / length_m) >= length_m - kEndSlack_m;
 }
 
-bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body,
-                             double margin_px) const {
-  const BoardPlacement& board = state_->scene.board;
+bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body, double margin_px,
+                             std::size_t which) const {
+  const BoardPlacement& board = state_->scene.boards[which];
   const CameraIntrinsics& camera = state_->scene.mount.color;
   const Transform<Camera, Board> camera_T_board = base_T_camera.inverse() * board.base_T_board;
   const Vector3d center = camera_T_board * board.spec.center();
@@ -116,12 +116,13 @@ bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const
 }
 
 hal::CornerObservation Renderer::observe_corners(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
-                                                 double sigma_px) const {
+                                                 std::size_t which, double sigma_px) const {
+  constexpr double kMargin_px = 8;
   hal::CornerObservation observation;
-  if (!board_in_view(base_T_camera, exposure.body)) return observation;
-  const BoardPlacement& board = state_->scene.board;
+  if (!board_in_view(base_T_camera, exposure.body, kMargin_px, which)) return observation;
+  const BoardPlacement& board = state_->scene.boards[which];
   const Transform<Camera, Board> camera_T_board = base_T_camera.inverse() * board.base_T_board;
-  Random random(mix64(exposure.seed) ^ exposure.frame, kCornerStream);
+  Random random(mix64(exposure.seed) ^ exposure.frame, kCornerStream + (std::uint64_t{which} << 32));
   for (int i = 0; i < board.spec.corners(); ++i) {
     const auto pixel = project(state_->scene.mount.color, camera_T_board * board.spec.corner(i));
     ENSURE(5213, pixel.has_value());

@@ -64,13 +64,14 @@ class Renderer {
   /// Millimetres along the optical axis, 0 without return; `out` has the size of depth_intrinsics(detail).
   void render_depth(const Transform<Base, Depth>& base_T_depth, const Exposure& exposure, DepthDetail detail,
                     ImageView<std::uint16_t> out) const;
-  /// The board's corners with `sigma_px` of noise; empty unless board_in_view.
+  /// The corners of one of the scene's boards with `sigma_px` of noise; empty unless board_in_view.
   [[nodiscard]] hal::CornerObservation observe_corners(const Transform<Base, Camera>& base_T_camera,
-                                                       const Exposure& exposure, double sigma_px = 0.1) const;
+                                                       const Exposure& exposure, std::size_t which = 0,
+                                                       double sigma_px = 0.1) const;
   /// True when the camera sees the whole pattern: inside the picture with `margin_px`, from the front at a tilt of at
   /// most 70 degrees, squares at least 6 px wide, nothing in between.
   [[nodiscard]] bool board_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body,
-                                   double margin_px = 8) const;
+                                   double margin_px = 8, std::size_t which = 0) const;
 
   /// Distance to the first surface along a unit direction, the arm left out; infinity when there is none. To 1e-5 m.
   [[nodiscard]] double ray_m(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction) const;

@@ -178,7 +178,7 @@ Solid board_panel(const BoardPlacement& board) {
   const Eigen::Vector2d ink = ink_extent(board.spec).size_m;
   const Vector3d size(ink.x() + 2 * board.white_margin_m, ink.y() + 2 * board.white_margin_m, board.thickness_m);
   Solid panel;
-  panel.name = "board";
+  panel.name = board.name;
   panel.shape = Box{0.5 * size};
   panel.base_T_solid = board.base_T_board.pose();
   panel.base_T_solid.translate(board.spec.center() + Vector3d(0, 0, 0.5 * board.thickness_m));
@@ -186,16 +186,23 @@ Solid board_panel(const BoardPlacement& board) {
   return panel;
 }
 
-void move_board(Scene& scene, const Transform<Base, Board>& base_T_board) {
-  scene.board.base_T_board = base_T_board;
-  scene.solids[scene.board_solid] = board_panel(scene.board);
+const BoardPlacement* board_of_solid(const Scene& scene, std::size_t solid) {
+  const auto found = std::ranges::find(scene.boards, solid, &BoardPlacement::solid);
+  return found == scene.boards.end() ? nullptr : &*found;
 }
 
-void exchange_board(Scene& scene, const BoardSpec& board) {
-  Pose base_T_board = scene.board.base_T_board.pose();
-  base_T_board.translate(scene.board.spec.center() - board.center());
-  scene.board.spec = board;
-  move_board(scene, Transform<Base, Board>(base_T_board));
+void move_board(Scene& scene, const Transform<Base, Board>& base_T_board, std::size_t which) {
+  BoardPlacement& board = scene.boards[which];
+  board.base_T_board = base_T_board;
+  scene.solids[board.solid] = board_panel(board);
+}
+
+void exchange_board(Scene& scene, const BoardSpec& board, std::size_t which) {
+  BoardPlacement& placed = scene.boards[which];
+  Pose base_T_board = placed.base_T_board.pose();
+  base_T_board.translate(placed.spec.center() - board.center());
+  placed.spec = board;
+  move_board(scene, Transform<Base, Board>(base_T_board), which);
 }
 
 }  // namespace firstlook::sim

@@ -50,13 +50,15 @@ struct Solid {
   Surface surface;
 };
 
-/// The printed board on a thin panel. Its front is the plane z = 0 of the board frame; the panel lies behind it (z >
+/// A printed board on a thin panel. Its front is the plane z = 0 of the board frame; the panel lies behind it (z >
 /// 0).
 struct BoardPlacement {
+  std::string name = "board";
   BoardSpec spec;
   Transform<Base, Board> base_T_board;
   double white_margin_m = 0.03;  ///< around the outer squares
   double thickness_m = 0.01;
+  std::size_t solid = 0;  ///< which of the scene's solids is its panel
 };
 
 /// Where the cameras truly sit, and what they truly are.
@@ -96,9 +98,8 @@ struct Scene {
   std::string name;
   std::string arm_model = "ur5";
   JointVector start_rad;
-  std::vector<Solid> solids;    ///< floor, walls, cart and the board's panel included; not the arm
-  std::size_t board_solid = 0;  ///< which of them is the board's panel
-  BoardPlacement board;
+  std::vector<Solid> solids;  ///< floor, walls, cart and the boards' panels included; not the arm
+  std::vector<BoardPlacement> boards = std::vector<BoardPlacement>(1);
   CameraMount mount;
   SafeZone safe_zone;  ///< its floor is the cart's top
   std::vector<Region> regions;
@@ -123,11 +124,14 @@ struct Scene {
 /// The axis-aligned box around a solid, in base coordinates.
 [[nodiscard]] Eigen::AlignedBox3d bounds(const Solid& solid);
 
-/// Puts the board elsewhere and its panel with it.
-void move_board(Scene& scene, const Transform<Base, Board>& base_T_board);
+/// The board whose panel this solid is; null for all others.
+[[nodiscard]] const BoardPlacement* board_of_solid(const Scene& scene, std::size_t solid);
+
+/// Puts a board elsewhere and its panel with it.
+void move_board(Scene& scene, const Transform<Base, Board>& base_T_board, std::size_t which = 0);
 
 /// Hangs another board at the same place: the middles of the points and the directions of the rows are the same.
-void exchange_board(Scene& scene, const BoardSpec& board);
+void exchange_board(Scene& scene, const BoardSpec& board, std::size_t which = 0);
 
 /// The panel that carries a board.
 [[nodiscard]] Solid board_panel(const BoardPlacement& board);

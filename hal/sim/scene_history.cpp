@@ -19,27 +19,31 @@ constexpr double kObstacleRadius_m = 0.65;  // outside the safe zone, within rea
 constexpr double kObstacleHeight_m = 0.4;
 constexpr double kObstacleTurn_rad = 1.0;
 
-void hide_board(Scene& scene) {
-  Pose buried = scene.board.base_T_board.pose();
-  buried.translation().z() += kBuried_m;
-  move_board(scene, Transform<Base, Board>(buried));
+void hide_boards(Scene& scene) {
+  for (std::size_t k = 0; k < scene.boards.size(); ++k) {
+    Pose buried = scene.boards[k].base_T_board.pose();
+    buried.translation().z() += kBuried_m;
+    move_board(scene, Transform<Base, Board>(buried), k);
+  }
 }
 
-/// The camera stands on a tripod and looks squarely at the board.
+/// The camera stands on a tripod and looks squarely at the first board.
 void fix_camera(Scene& scene) {
-  const Eigen::Vector3d middle = scene.board.spec.center() - Eigen::Vector3d(0, 0, kFixedCameraDistance_m);
+  const BoardPlacement& board = scene.boards.front();
+  const Eigen::Vector3d middle = board.spec.center() - Eigen::Vector3d(0, 0, kFixedCameraDistance_m);
   scene.mount.link = 0;
-  scene.mount.link_T_camera = scene.board.base_T_board.pose() * Eigen::Translation3d(middle);
+  scene.mount.link_T_camera = board.base_T_board.pose() * Eigen::Translation3d(middle);
 }
 
-void shift_board(Scene& scene) {
+void shift_board(Scene& scene, const Faults& faults) {
   const Pose shift =
       Eigen::Translation3d(kBoardSlide_m, 0, 0) * Pose(Eigen::AngleAxisd(kBoardTurn_rad, Eigen::Vector3d::UnitZ()));
-  move_board(scene, Transform<Base, Board>(scene.board.base_T_board.pose() * shift));
+  const std::size_t which = std::min(static_cast<std::size_t>(faults.board_number), scene.boards.size()) - 1;
+  move_board(scene, Transform<Base, Board>(scene.boards[which].base_T_board.pose() * shift), which);
 }
 
 /// A box in reach, one radian to the left of where the hand stood at first, as high as the upper arm.
-void add_obstacle(Scene& scene) {
+void add_obstacle(Scene& scene, const Faults& /*faults*/) {
   const std::optional<ArmModel> arm = find_arm_model(scene.arm_model);
   const Eigen::Vector3d hand = arm ? forward(*arm, scene.start_rad).flange().translation() : Eigen::Vector3d::UnitX();
   const double azimuth_rad = std::atan2(hand.y(), hand.x()) + kObstacleTurn_rad;
@@ -84,17 +88,17 @@ void SceneWorld::matter(const GridGeometry& geometry, std::vector<std::uint8_t>&
 SceneHistory::SceneHistory(const Scene& scene, const Faults& faults) {
   Scene now = scene;
   if (faults.camera_fixed) fix_camera(now);
-  if (faults.board_absent) hide_board(now);
+  if (faults.board_absent) hide_boards(now);
   spans_.push_back(std::make_unique<SceneSpan>(Instant{}, now));
   struct Change {
     double at_s;
-    void (*apply)(Scene&);
+    void (*apply)(Scene&, const Faults&);
   };
   std::array changes = {Change{faults.board_move_s, shift_board}, Change{faults.obstacle_s, add_obstacle}};
   std::ranges::stable_sort(changes, {}, &Change::at_s);
   for (const Change& change : changes) {
     if (!std::isfinite(change.at_s)) continue;
-    change.apply(now);
+    change.apply(now, faults);
     spans_.push_back(std::make_unique<SceneSpan>(Instant{seconds(change.at_s).ns}, now));
   }
 }

@@ -54,13 +54,14 @@ Status SimulatedColorCamera::read(const hal::Frame& frame, MutableGrayImage imag
   return {};
 }
 
-std::optional<hal::CornerObservation> SimulatedColorCamera::read_corners(const hal::Frame& frame) {
+std::optional<hal::CornerObservation> SimulatedColorCamera::read_corners(const hal::Frame& frame, int target) {
   const memory::SimulationScope simulation;
   if (!delivers_corners_) return std::nullopt;
   const Result<ExposedFrame> held = clock_.find(frame);
   if (!held) return std::nullopt;
   return scenes_.at(held->exposed)
-      .renderer.observe_corners(rig_.base_T_camera(held->true_joints_rad), rig_.exposure(*held, seed_));
+      .renderer.observe_corners(rig_.base_T_camera(held->true_joints_rad), rig_.exposure(*held, seed_),
+                                static_cast<std::size_t>(target));
 }
 
 SimulatedDepthCamera::SimulatedDepthCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig,

@@ -36,7 +36,7 @@ class SimulatedColorCamera final : public hal::ColorCamera {
   [[nodiscard]] Instant next_due() const override { return clock_.next_due(); }
   [[nodiscard]] hal::StreamCounters counters() const override { return clock_.counters(); }
   [[nodiscard]] Status read(const hal::Frame& frame, MutableGrayImage image) override;
-  [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame) override;
+  [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame, int target) override;
 
  private:
   FrameClock clock_;

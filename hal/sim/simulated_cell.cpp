@@ -1,5 +1,7 @@
 #include "hal/sim/simulated_cell.hpp"
 
+#include <algorithm>
+
 #include "algorithms/kinematics/arm_model.hpp"
 #include "hal/sim/cell_file.hpp"
 #include "hal/sim/faults.hpp"
@@ -75,7 +77,9 @@ Transform<Camera, Depth> stated_mount(const Transform<Camera, Depth>& mount, con
   return {Eigen::Quaterniond(turn) * mount.quaternion(), mount.translation() + shift};
 }
 
-CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail) {
+/// @param sought  so many of the scene's boards, the first ones, are what the job looks for
+CellDescription describe_cell(const Scene& scene, std::size_t sought, const Renderer& renderer, const Faults& faults,
+                              DepthDetail detail) {
   CellDescription d;
   d.name = scene.name;
   d.arm_model = scene.arm_model;
@@ -86,7 +90,7 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
   d.depth_range_max_m = renderer.sensor().range_max_m;
   d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
   d.camera_T_depth = stated_mount(scene.mount.camera_T_depth, faults);
-  d.board = scene.board.spec;
+  for (std::size_t k = 0; k < sought; ++k) d.boards.push_back({scene.boards[k].name, scene.boards[k].spec});
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;
   for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});
@@ -122,13 +126,36 @@ SimulatedArmOptions arm_options(const Scene& scene, const ArmModel& model, const
   return options;
 }
 
+/// Hangs the boards that are looked for in place of the cell's, and puts them first.
+Status hang_boards(std::span<const NamedTarget> boards, Scene& scene) {
+  for (std::size_t k = 0; k < boards.size(); ++k) {
+    const NamedTarget& board = boards[k];
+    const bool only = board.name.empty() && scene.boards.size() == 1;
+    const auto place = only ? scene.boards.begin() : std::ranges::find(scene.boards, board.name, &BoardPlacement::name);
+    if (place == scene.boards.end()) {
+      std::vector<std::string> names;
+      for (const BoardPlacement& placed : scene.boards) names.push_back(placed.name);
+      return failure(Fault::kConfigBadValue, "{}: no place for {}; the cell's boards are {}: list yours under 'boards'",
+                     scene.name, board.name.empty() ? "one board without a name" : "a board '" + board.name + "'",
+                     fmt::join(names, ", "));
+    }
+    exchange_board(scene, board.board, static_cast<std::size_t>(place - scene.boards.begin()));
+    const auto front = scene.boards.begin() + static_cast<std::ptrdiff_t>(k);
+    std::rotate(front, place, place + 1);
+  }
+  std::vector<NamedTarget> all;
+  for (const BoardPlacement& placed : scene.boards) all.push_back({placed.name, placed.spec});
+  return check_distinct(all);
+}
+
 class Cell final : public SimulatedCell {
  public:
   Cell(const Scene& loaded, const ArmModel& model, const Faults& faults, const SimulationOptions& options)
       : scenes_(loaded, faults),
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
-        description_(describe_cell(scene_, first_.renderer, faults, detail(options))),
+        description_(describe_cell(scene_, options.boards.empty() ? scene_.boards.size() : options.boards.size(),
+                                   first_.renderer, faults, detail(options))),
         grader_(truth_of(scene_, model, first_, faults, options)),
         watcher_(grader_.monitor(), scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
@@ -173,7 +200,7 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   if (!faults) return std::unexpected(faults.error());
   Result<Scene> scene = load_cell(options.cell, options.seed);
   if (!scene) return std::unexpected(scene.error());
-  if (options.board) exchange_board(*scene, *options.board);
+  if (const Status hung = hang_boards(options.boards, *scene); !hung) return std::unexpected(hung.error());
   const std::optional<ArmModel> model = find_arm_model(scene->arm_model);
   if (!model) return failure(Fault::kCellInvalid, "{}: no arm model '{}'", scene->name, scene->arm_model);
   if (scene->start_rad.size() != model->joints) {

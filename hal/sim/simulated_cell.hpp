@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "algorithms/mapping/safe_zone.hpp"
-#include "algorithms/vision/target.hpp"
+#include "algorithms/vision/target_set.hpp"
 #include "hal/api/cameras.hpp"
 #include "hal/api/operator_devices.hpp"
 #include "hal/api/robot_arm.hpp"
@@ -21,12 +21,14 @@
 namespace firstlook::sim {
 
 struct SimulationOptions {
-  std::string cell = "workshop";     ///< built-in name, "random:SEED", or a file
-  std::uint64_t seed = 1;            ///< of noise, deviations, faults and the true mount
-  bool fast_sensor = false;          ///< coarser depth, corners instead of pixels
-  std::string faults;                ///< faults.hpp
-  int workers = 2;                   ///< threads of the observable set; results do not depend on it
-  std::optional<BoardSpec> board{};  ///< hangs in the cell in place of the cell's own
+  std::string cell = "workshop";  ///< built-in name, "random:SEED", or a file
+  std::uint64_t seed = 1;         ///< of noise, deviations, faults and the true mount
+  bool fast_sensor = false;       ///< coarser depth, corners instead of pixels
+  std::string faults;             ///< faults.hpp
+  int workers = 2;                ///< threads of the observable set; results do not depend on it
+  /// What the job looks for: each hangs in place of the cell's board of its name, one without a name in place of the
+  /// only one. Empty: the cell's own boards. The colour camera counts them in this order.
+  std::vector<NamedTarget> boards{};
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.
@@ -48,8 +50,8 @@ struct CellDescription {
   double depth_range_trusted_m = 3.0;
   double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
-  BoardSpec board;
-  double cart_top_m = -0.02;  ///< z of the cart's own top
+  std::vector<NamedTarget> boards;          ///< those that the job looks for
+  double cart_top_m = -0.02;                ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
 };
@@ -69,7 +71,8 @@ class SimulatedCell {
 };
 
 /// Builds a cell from its options. Errors: kCellInvalid for a cell that cannot be used, kUsage for a fault
-/// specification that is not understood, kDataMissing for a file that cannot be opened.
+/// specification that is not understood, kConfigBadValue for boards that the cell has no place for, kDataMissing for a
+/// file that cannot be opened.
 [[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options);
 
 }  // namespace firstlook::sim

@@ -60,7 +60,7 @@ inline constexpr std::array kBudget = {
     BudgetRow{Pool::kEventQueue,       "event queue",         1,  1280 * kKiB,      "loop",        "64 events of 16 KiB with their heads"},
     BudgetRow{Pool::kJournal,          "journal buffer",      1,  1 * kMiB,         "loop",        "records between two writes to the disk"},
     BudgetRow{Pool::kJobBuffers,       "job buffers",         8,  32 * kKiB,        "loop, jobs",  "arguments (8 KiB) and result (16 KiB) of each outstanding job"},
-    BudgetRow{Pool::kCalibrationViews, "calibration views",   64, 16 * kKiB,        "jobs",        "joints, corners and poses of each view"},
+    BudgetRow{Pool::kCalibrationViews, "calibration views",   64, 48 * kKiB,        "jobs",        "joints, corners and poses of each view, of each target in it"},
     BudgetRow{Pool::kApplication,      "application",         1,  4 * kMiB,         "loop",        "machine, guardian, records of phases, stops and views"},
     BudgetRow{Pool::kReportBuffers,    "report buffers",      1,  16 * kMiB,        "report",      "pictures and text of the report; pictures of calibration views"},
     BudgetRow{Pool::kThreadStacks,     "thread stacks",       kThreadsMax, kThreadStackBytes, "all", "created at boot"},

@@ -136,7 +136,8 @@ std::vector<JointVector> chosen_views(const Cell& cell, const ViewDesignModel& m
     options.step = static_cast<std::uint32_t>(view);
     // One view alone leaves directions open, which only the volume tells apart.
     options.criterion = view < 3 ? DesignCriterion::kVolume : DesignCriterion::kCost;
-    const CalibrationViewInputs inputs{cell.arm, cell.body, cell.space, cell.clearance, model, information, taken};
+    const CalibrationViewInputs inputs{cell.arm,    cell.body,   cell.space, cell.clearance,
+                                       {&model, 1}, information, taken};
     const auto choice = next(inputs, at, options);
     if (!choice || choice->outcome != CalibrationViewChoice::Outcome::kChosen) break;
     at = choice->target;

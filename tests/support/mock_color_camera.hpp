@@ -14,8 +14,9 @@ class MockColorCamera final : public MockStream<hal::ColorCamera> {
                            Duration period = milliseconds(66))
       : MockStream(intrinsics, period) {}
 
-  std::uint8_t gray = 128;                                                          ///< of every pixel
-  std::function<std::optional<hal::CornerObservation>(const hal::Frame&)> corners;  ///< none: pixels only
+  std::uint8_t gray = 128;  ///< of every pixel
+  /// Of a frame and a target; none: pixels only.
+  std::function<std::optional<hal::CornerObservation>(const hal::Frame&, int)> corners;
 
   [[nodiscard]] Status read(const hal::Frame& frame, MutableGrayImage image) override {
     if (!holds(frame)) return failure(Fault::kFrameGone, "colour frame {}", frame.sequence);
@@ -23,9 +24,9 @@ class MockColorCamera final : public MockStream<hal::ColorCamera> {
     std::ranges::fill(image.pixels(), gray);
     return {};
   }
-  [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame) override {
+  [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame, int target) override {
     if (!corners || !holds(frame)) return std::nullopt;
-    return corners(frame);
+    return corners(frame, target);
   }
 };
 

@@ -31,6 +31,7 @@ class ScriptedWorld : public DecisionSink {
   std::function<DetectResult(const DetectArguments&)> detect = [](const DetectArguments& a) {
     DetectResult r;
     r.found = true;
+    r.targets = 1;
     r.changed = a.purpose == BoardLook::kIdentify;
     return r;
   };
@@ -51,6 +52,7 @@ class ScriptedWorld : public DecisionSink {
   SolveResult solve = [] {
     SolveResult r;
     r.solved = true;
+    r.targets = 1;
     return r;
   }();
   ValidateResult validate{.accepted = true};
@@ -62,10 +64,11 @@ class ScriptedWorld : public DecisionSink {
   VerifyResult verify = [] {
     VerifyResult r;
     r.accepted = true;
+    r.targets = 1;
     return r;
   }();
   IntegrateResult integrated{.used = true, .path_free = true};
-  CheckBoardResult check{.seen = true, .moved = false};
+  CheckBoardResult check{.seen = 1, .moved = 0};
   int locate_views = 4;
   bool devices = true;
   bool consent = true;

@@ -36,6 +36,15 @@ void take(Machine& m, const CalibrationViewResult& choice) {
 
 }  // namespace
 
+void note_targets(Machine& m, TargetMask seen) {
+  Progress& p = m.progress();
+  const auto first = static_cast<TargetMask>(seen & ~p.located);
+  if (first == 0 || p.target_views.full()) return;
+  p.target_views.push_back({m.arm().position_rad, first});
+  p.located |= first;
+  p.relevant = p.located;
+}
+
 void enter_collect(Machine& m) { next_view(m); }
 
 Handled on_collect(Machine& m, const MachineEvent& event) {
@@ -48,6 +57,7 @@ Handled on_collect(Machine& m, const MachineEvent& event) {
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
     if (!seen->still && m.look_again(seen->moved_px)) return Handled::kNo;
     if (seen->found) {
+      note_targets(m, seen->targets);
       ++p.observations;
       p.failed_looks = 0;
     } else if (++p.failed_looks > kFailedLooksMax) {

@@ -1,11 +1,44 @@
-/// VerifyBoard and Park: the board must stand where it stood (safety rule 12), and the arm goes to its parking pose.
+/// VerifyBoard and Park: each board must stand where it stood (safety rule 12), and the arm goes to its parking pose.
 #include "app/machine/states/states.hpp"
 
 namespace firstlook::states {
 
-void enter_verify_board(Machine& m) {
+namespace {
+
+/// Targets that the place shows and that are still to be looked at.
+TargetMask open_targets(const Progress& p, const TargetView& view) {
+  return static_cast<TargetMask>(view.targets & p.relevant & ~p.standing);
+}
+
+void look_at_next(Machine& m) {
+  Progress& p = m.progress();
+  while (p.view < p.target_views.size() && open_targets(p, p.target_views[p.view]) == 0) ++p.view;
+  if (p.view == p.target_views.size()) {
+    m.conclude(Outcome::kDone, std::nullopt);
+    return;
+  }
   m.show("looking at the board again");
-  plan_to(m, m.progress().board_view_rad, MotionPhase::kMapping);
+  plan_to(m, p.target_views[p.view].at_rad, MotionPhase::kMapping);
+}
+
+void judge(Machine& m, const CheckBoardResult& check) {
+  Progress& p = m.progress();
+  const TargetMask open = open_targets(p, p.target_views[p.view]);
+  if (check.moved != 0) {
+    m.conclude(Outcome::kSafelyStopped, Fault::kBoardMoved);
+  } else if ((open & ~check.seen) != 0) {
+    m.conclude(Outcome::kSafelyStopped, Fault::kBoardNotFound);
+  } else {
+    p.standing |= check.seen;
+    look_at_next(m);
+  }
+}
+
+}  // namespace
+
+void enter_verify_board(Machine& m) {
+  m.progress().view = 0;
+  look_at_next(m);
 }
 
 Handled on_verify_board(Machine& m, const MachineEvent& event) {
@@ -19,11 +52,7 @@ Handled on_verify_board(Machine& m, const MachineEvent& event) {
     m.start_job(JobKind::kCheckBoard, DetectArguments{BoardLook::kConclude, 0, m.look(), m.looks()});
   } else if (const auto check = m.result_of<CheckBoardResult>(JobKind::kCheckBoard, event)) {
     if (!check->still && m.look_again(check->moved_px)) return Handled::kNo;
-    if (check->seen && !check->moved) {
-      m.conclude(Outcome::kDone, std::nullopt);
-    } else {
-      m.conclude(Outcome::kSafelyStopped, check->seen ? Fault::kBoardMoved : Fault::kBoardNotFound);
-    }
+    judge(m, *check);
   }
   switch (m.advance_trip(event)) {
     case Machine::Trip::kArrived:

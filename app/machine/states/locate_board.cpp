@@ -1,16 +1,33 @@
-/// LocateBoard: turn until the board is seen, inside the safe zone.
+/// LocateBoard: turn until the board is seen, or until all are, inside the safe zone.
+#include <bit>
+
 #include "app/machine/states/states.hpp"
 
 namespace firstlook::states {
 namespace {
 
+bool has_stored(const Machine& m) {
+  return m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
+}
+
+void leave(Machine& m) {
+  m.progress().views = {};
+  m.transition(has_stored(m) ? StateId::kVerifyCalibration : StateId::kIdentifyLink);
+}
+
 void go_to_view(Machine& m) {
   Progress& p = m.progress();
   if (p.view >= p.views.views_rad.size()) {
+    if (p.located != 0) {
+      m.show("{} of {} boards were seen", std::popcount(p.located), m.settings().targets);
+      leave(m);
+      return;
+    }
     m.conclude(Outcome::kSafelyStopped, Fault::kBoardNotLocated);
     return;
   }
-  m.show("looking for the board, view {} of {}", p.view + 1, p.views.views_rad.size());
+  m.show("looking for the {}, view {} of {}", m.settings().targets > 1 ? "boards" : "board", p.view + 1,
+         p.views.views_rad.size());
   plan_to(m, p.views.views_rad[p.view], MotionPhase::kBeforeCalibration);
 }
 
@@ -48,11 +65,11 @@ Handled on_locate_board(Machine& m, const MachineEvent& event) {
   } else if (m.advance_look(event)) {
     m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kLocate, 0, m.look()});
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
-    if (seen->found) {
-      p.board_view_rad = m.arm().position_rad;
-      p.views = {};
-      const bool stored = m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
-      m.transition(stored ? StateId::kVerifyCalibration : StateId::kIdentifyLink);
+    if (seen->found && p.located == 0) p.board_view_rad = m.arm().position_rad;
+    if (seen->found) note_targets(m, seen->targets);
+    // A stored calibration is tested on whichever board is seen first.
+    if (std::popcount(p.located) >= (has_stored(m) ? 1 : m.settings().targets)) {
+      leave(m);
     } else {
       next_view(m);
     }

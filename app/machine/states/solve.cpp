@@ -23,6 +23,7 @@ Handled on_solve(Machine& m, const MachineEvent& event) {
         m.show("stamps corrected by {:.2f} ms (colour), {:.2f} ms (depth)", 1000 * result->offsets.color_s,
                1000 * result->offsets.depth_s);
       }
+      m.progress().relevant = result->targets;
       m.correct_stamps(result->offsets);
       m.transition(StateId::kValidate);
     } else {

@@ -47,6 +47,8 @@ Handled on_ended(Machine& m, const MachineEvent& event);
 
 /// False from a protective or emergency stop until a person has cleared it.
 [[nodiscard]] bool may_move(hal::ArmSafety safety);
+/// Remembers from where targets were seen for the first time.
+void note_targets(Machine& m, TargetMask seen);
 /// Asks for a path from here to `target`.
 void plan_to(Machine& m, const JointVector& target, MotionPhase phase);
 /// The body and space that motions are certified for now.

@@ -47,6 +47,7 @@ void conclude(Machine& m, const VerifyResult& result) {
     m.conclude(Outcome::kDone, std::nullopt);
   } else {
     m.progress().calibration_accepted = true;
+    m.progress().relevant = result.targets;
     m.correct_stamps(result.offsets);
     m.show("the stored calibration holds; clearance {:.0f} mm", 1000 * result.clearance_m);
     m.transition(StateId::kSweep);
@@ -72,6 +73,7 @@ Handled on_verify_calibration(Machine& m, const MachineEvent& event) {
     m.start_job(JobKind::kDetectBoard, DetectArguments{BoardLook::kVerify, p.observations, m.look(), m.looks()});
   } else if (const auto seen = m.result_of<DetectResult>(JobKind::kDetectBoard, event)) {
     if (!seen->still && m.look_again(seen->moved_px)) return Handled::kNo;
+    if (seen->found) note_targets(m, seen->targets);
     ++(seen->found ? p.observations : p.failed_looks);
     next_view(m);
   } else if (const auto result = m.result_of<VerifyResult>(JobKind::kVerifyCalibration, event)) {

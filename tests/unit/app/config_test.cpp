@@ -249,3 +249,44 @@ TEST_CASE("keys of a board and the board itself mean the same", "[app][config]")
   CHECK(same.detector == "thesis2014_plain");
   CHECK(board_of(same).value() == *board);
 }
+
+TEST_CASE("several boards are read strictly, printed, and read back", "[app][config]") {
+  const std::string two =
+      "boards:\n"
+      "  - {name: door, type: apriltag, inner_columns: 5, inner_rows: 4, square_size_m: 0.05}\n"
+      "  - {name: table 2, detector: thesis2014}\n";
+  const auto config = parse_config(two, "a.yaml");
+  REQUIRE(config);
+  const auto targets = targets_of(*config);
+  REQUIRE(targets);
+  REQUIRE(targets->size() == 2);
+  CHECK((*targets)[0].name == "door");
+  CHECK((*targets)[0].board.type == TargetType::kMarkerGrid);
+  CHECK((*targets)[1].board == BoardSpec{});
+  CHECK(names_boards(*config));
+  const std::string printed = print_config(*config);
+  CHECK_THAT(printed, !Contains("\nboard:"));
+  CHECK(parse_config(printed, "printed.yaml").value() == *config);
+  CHECK_THAT(print_config(Config{}), Contains("boards: []"));
+
+  const auto complaint = [](const std::string& yaml) { return std::string(parse_config(yaml, "a.yaml").error().detail()); };
+  CHECK_THAT(complaint(two + "board: {inner_rows: 7}\n"), Contains("'board' and 'boards'"));
+  CHECK_THAT(complaint("boards:\n  - {name: a}\n  - {name: b}\n"), Contains("'a' and 'b'") && Contains("9x6"));
+  CHECK_THAT(complaint("boards:\n  - {name: a}\n  - {name: a, type: apriltag}\n"), Contains("named 'a'"));
+  CHECK_THAT(complaint("boards:\n  - {inner_rows: 7}\n"), Contains("boards[0].name is missing"));
+  CHECK_THAT(complaint("boards:\n  - {name: a, inner_row: 7}\n"),
+             Contains("a.yaml:2:") && Contains("boards[0].inner_row;") && Contains("inner_rows?"));
+  CHECK_THAT(complaint("boards:\n  - {name: a, inner_rows: 70}\n"), Contains("boards[0].inner_rows is 70"));
+  CHECK_THAT(complaint("boards:\n  - {name: \"a,b\"}\n"), Contains("comma"));
+  CHECK_THAT(complaint("boards: {name: a}\n"), Contains("list"));
+}
+
+TEST_CASE("boards that a cell brings along keep the detector", "[app][config]") {
+  Config config;
+  config.board.detector = "thesis2014";
+  const std::vector<NamedTarget> two = {{"a", BoardSpec{}}, {"b", BoardSpec{7, 4, 0.04}}};
+  set_targets(two, config);
+  REQUIRE(config.boards.size() == 2);
+  CHECK(config.boards[1].board.detector == "thesis2014");
+  CHECK(targets_of(config).value()[1].board == two[1].board);
+}

@@ -103,7 +103,7 @@ TEST_CASE("a rejected calibration maps nothing", "[machine]") {
 
 TEST_CASE("a board that moved rejects the map", "[machine]") {
   ScriptedWorld world;
-  world.check.moved = true;
+  world.check.moved = 1;
   world.run_until(StateId::kReady);
   world.press(OperatorAction::kPlay);
   REQUIRE(world.run_to_end());
@@ -321,13 +321,13 @@ TEST_CASE("a picture that never stands still is used in the end, and said", "[ma
 
 TEST_CASE("the board is not judged to have moved by a picture that moves", "[machine]") {
   ScriptedWorld w;
-  w.check = {.seen = true, .moved = true, .still = false, .moved_px = 0.4};
+  w.check = {.seen = 1, .moved = 1, .still = false, .moved_px = 0.4};
   REQUIRE(w.run_until(StateId::kReady));
   w.press(hal::OperatorAction::kPlay);
   REQUIRE(w.run_until(StateId::kVerifyBoard, 4000));
   for (int i = 0; i < 250; ++i) w.tick();  // 2 s
   REQUIRE(w.machine.state() == StateId::kVerifyBoard);
-  w.check = {.seen = true, .moved = false};
+  w.check = {.seen = 1, .moved = 0};
   REQUIRE(w.run_to_end());
   CHECK(w.ending.outcome == Outcome::kDone);
 }
@@ -498,6 +498,54 @@ TEST_CASE("the state table is sound", "[machine]") {
     CHECK(is_within(row.state, StateId::kRunning));
   }
   CHECK(state_diagram().find("Ready --> LocateBoard") != std::string::npos);
+}
+
+TEST_CASE("with several boards the search goes on until all were seen, and each is looked at again", "[machine]") {
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.targets = 3;
+  ScriptedWorld world(settings);
+  int looks = 0;
+  world.detect = [&](const DetectArguments& a) {
+    DetectResult r;
+    r.found = a.purpose != BoardLook::kLocate || looks != 1;
+    r.changed = a.purpose == BoardLook::kIdentify;
+    r.targets = 1;
+    if (a.purpose == BoardLook::kLocate) r.targets = looks++ == 0 ? 1 : 2;  // the third is nowhere
+    return r;
+  };
+  world.solve.targets = 3;
+  world.check.seen = 3;
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(looks == world.locate_views);
+  CHECK(world.ending.outcome == Outcome::kDone);
+  CHECK(std::ranges::count(world.shown, "2 of 3 boards were seen") == 1);
+
+  SECTION("the second is not where it was") {
+    ScriptedWorld again(settings);
+    looks = 0;
+    again.detect = world.detect;
+    again.solve.targets = 3;
+    again.check.seen = 1;
+    again.run_until(StateId::kReady);
+    again.press(OperatorAction::kPlay);
+    REQUIRE(again.run_to_end());
+    CHECK(again.ending.fault == Fault::kBoardNotFound);
+    CHECK(std::ranges::count(again.shown, "looking at the board again") == 2);
+  }
+  SECTION("one that the solve could not place is not missed") {
+    ScriptedWorld again(settings);
+    looks = 0;
+    again.detect = world.detect;
+    again.solve.targets = 1;
+    again.check.seen = 1;
+    again.run_until(StateId::kReady);
+    again.press(OperatorAction::kPlay);
+    REQUIRE(again.run_to_end());
+    CHECK(again.ending.outcome == Outcome::kDone);
+    CHECK(std::ranges::count(again.shown, "looking at the board again") == 1);
+  }
 }
 
 }  // namespace firstlook

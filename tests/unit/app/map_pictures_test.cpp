@@ -27,7 +27,7 @@ struct Scene {
                         {std::cos(turn), std::sin(turn), 0}});
     }
   }
-  [[nodiscard]] MapPictureInputs inputs() const { return {map, &swept, zone, places, board}; }
+  [[nodiscard]] MapPictureInputs inputs() const { return {map, &swept, zone, places, {board}}; }
 };
 
 bool inside(const MapPicture& p, const Eigen::Vector2d& at) {

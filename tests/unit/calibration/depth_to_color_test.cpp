@@ -47,7 +47,7 @@ Vector7d error_of(const DepthSetup& s, const DepthMount& mount) {
 }
 
 DepthToColor estimated(const DepthSetup& s, std::span<const DepthStop> stops) {
-  const auto result = estimate_depth_to_color(stops, factory(), s.color.board);
+  const auto result = estimate_depth_to_color(stops, factory());
   if (!result) FAIL(result.error().detail());
   return *result;
 }
@@ -155,8 +155,7 @@ TEST_CASE("directions that the boards do not tell stay as believed and are named
     CHECK(sigma[6] > 0.002);
   }
   SECTION("too few") {
-    const auto refused =
-        estimate_depth_to_color(stops_at(s, {{0, 0, .5}, {.4, 0, .6}}, random), factory(), s.color.board);
+    const auto refused = estimate_depth_to_color(stops_at(s, {{0, 0, .5}, {.4, 0, .6}}, random), factory());
     REQUIRE_FALSE(refused);
     CHECK(refused.error().fault == Fault::kTooFewViews);
     CHECK_THAT(std::string(refused.error().detail()), Contains("at 2 stops, 3 are needed"));
@@ -173,7 +172,7 @@ TEST_CASE("a stop whose plane is another's is left out", "[calibration]") {
   CHECK_FALSE(result.stops[7].used);
   CHECK(error_of(s, result.mount).head<3>().norm() < 0.004);
   for (std::size_t i = 0; i < 12; i += 2) std::swap(stops[i].plane, stops[i + 1].plane);
-  const auto refused = estimate_depth_to_color(stops, factory(), s.color.board);
+  const auto refused = estimate_depth_to_color(stops, factory());
   REQUIRE_FALSE(refused);
   CHECK_THAT(std::string(refused.error().detail()), Contains("contradict"));
 }
@@ -204,10 +203,10 @@ TEST_CASE("numbers that are not finite are refused by name", "[calibration]") {
   const DepthSetup s;
   auto stops = observe_stops(s, 5, random);
   stops[2].plane.inverse_depth.x() = std::nan("");
-  const auto refused = estimate_depth_to_color(stops, factory(), s.color.board);
+  const auto refused = estimate_depth_to_color(stops, factory());
   REQUIRE_FALSE(refused);
   CHECK_THAT(std::string(refused.error().detail()), Contains("stop 3"));
   DepthMount certain = factory();
   certain.covariance.setZero();
-  CHECK_FALSE(estimate_depth_to_color(observe_stops(s, 5, random), certain, s.color.board));
+  CHECK_FALSE(estimate_depth_to_color(observe_stops(s, 5, random), certain));
 }

@@ -73,7 +73,8 @@ inline DepthStop observe_stop(const DepthSetup& s, const Pose& camera_T_board, c
   const OwnedDepth depth = observe_depth(s, camera_T_board, random);
   const Pose expected = prior.inverse(Eigen::Isometry) * pose.camera_T_board.pose();
   const auto plane = find_board_plane(depth.image(), s.depth, s.color.board, Transform<Depth, Board>(expected)).value();
-  return {pose.camera_T_board, s.color.corner_sigma_px * s.color.corner_sigma_px * pose.unit_covariance, plane};
+  return {pose.camera_T_board, s.color.corner_sigma_px * s.color.corner_sigma_px * pose.unit_covariance, plane,
+          s.color.board.center()};
 }
 
 }  // namespace firstlook::test

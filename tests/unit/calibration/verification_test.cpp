@@ -239,8 +239,8 @@ TEST_CASE("residuals of the views are those of a standing board", "[calibration]
   CHECK(good.residual_rms_px < 0.6);
   CHECK(good.degrees_of_freedom == 12);
   // The board stands where it stands, as far as the calibration's and the arm's errors let it be known.
-  const Vector6d off = pose_difference(s.base_T_board, good.base_T_board.pose());
-  CHECK(off.dot(good.board_covariance.ldlt().solve(off)) < chi_square_quantile(0.9999, 6));
+  const Vector6d off = pose_difference(s.base_T_board, good.targets[0].base_T_board.pose());
+  CHECK(off.dot(good.targets[0].covariance.ldlt().solve(off)) < chi_square_quantile(0.9999, 6));
 
   Vector6d error = Vector6d::Zero();
   error[1] = 0.01;

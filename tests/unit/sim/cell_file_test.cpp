@@ -29,7 +29,7 @@ TEST_CASE("every built-in cell loads, and its board can be calibrated from the s
     const Result<Scene> scene = load_cell(cell.name, 3);
     REQUIRE(scene);
     CHECK(scene->name == cell.name);
-    CHECK(scene->solids[scene->board_solid].name == "board");
+    CHECK(scene->solids[scene->boards.front().solid].name == "board");
     CHECK(scene->safe_zone.floor_m == -0.02);
     // About 7 % of random configurations stand in the zone, 1 % of these see the board: 240 of 20,000 measured.
     CHECK(board_views(*scene, 60000, 1).size() >= 30);
@@ -76,8 +76,8 @@ TEST_CASE("a cell file says where the arm, the mount and the things are") {
   CHECK_FALSE(drum.surface.returns_depth);
   CHECK(std::get<Cylinder>(drum.shape).half_height_m == 0.4);
   // The board's middle and front are where the file says.
-  const Transform<Base, Board>& board = scene->board.base_T_board;
-  CHECK((board * scene->board.spec.center()).isApprox(Eigen::Vector3d(0.9, 0, 0.3)));
+  const Transform<Base, Board>& board = scene->boards.front().base_T_board;
+  CHECK((board * scene->boards.front().spec.center()).isApprox(Eigen::Vector3d(0.9, 0, 0.3)));
   CHECK(board.rotation().col(2).isApprox(Eigen::Vector3d(1, 0, -0.3).normalized()));
   CHECK(board.rotation().col(1).z() < -0.9);  // rows go down
 }
@@ -123,4 +123,34 @@ TEST_CASE("names that are no cell are refused") {
   CHECK(load_cell("no_such_cell", 1).error().fault == Fault::kDataMissing);
   CHECK(load_cell("random:", 1).error().fault == Fault::kCellInvalid);
   CHECK(load_cell("random:12x", 1).error().fault == Fault::kCellInvalid);
+}
+
+TEST_CASE("several boards hang in a cell, each with its panel; sets that cannot be told apart are refused") {
+  using Catch::Matchers::Contains;
+  const std::string place = "center_m: [0.9, 0, 0.3], faces: [-1, 0, 0.3]";
+  const auto two = parse_cell("boards:\n  - {name: a, " + place +
+                                  "}\n  - {name: b, center_m: [0, 0.9, 0.3], faces: [0, -1, 0], type: apriltag, "
+                                  "inner_columns: 4, inner_rows: 3, square_size_m: 0.06}\n",
+                              "cell.yaml", 1);
+  REQUIRE(two);
+  REQUIRE(two->boards.size() == 2);
+  for (const BoardPlacement& board : two->boards) {
+    CHECK(two->solids[board.solid].name == board.name);
+    CHECK(board_of_solid(*two, board.solid) == &board);
+    // Just behind the front is the panel, just before it is air.
+    CHECK(inside(*two, board.base_T_board * (board.spec.center() + Eigen::Vector3d(0, 0, 0.002))));
+    CHECK_FALSE(inside(*two, board.base_T_board * (board.spec.center() - Eigen::Vector3d(0, 0, 0.002))));
+  }
+  CHECK((two->boards[1].base_T_board * two->boards[1].spec.center()).isApprox(Eigen::Vector3d(0, 0.9, 0.3)));
+  Scene moved = *two;
+  move_board(moved, Transform<Base, Board>(Eigen::Quaterniond::Identity(), {0, 0, -5}), 1);
+  CHECK_FALSE(inside(moved, two->boards[1].base_T_board * (two->boards[1].spec.center() + Eigen::Vector3d(0, 0, 0.002))));
+  CHECK(moved.boards[0].base_T_board.pose().matrix() == two->boards[0].base_T_board.pose().matrix());
+
+  CHECK_THAT(complaint(kBoard + "boards: []\n"), Contains("either 'board' or 'boards'"));
+  CHECK_THAT(complaint("boards: []\n"), Contains("no target"));
+  CHECK_THAT(complaint("boards:\n  - {" + place + "}\n"), Contains("boards[0].name is missing"));
+  CHECK_THAT(complaint("boards:\n  - {name: a, " + place + "}\n  - {name: b, " + place + "}\n"),
+             Contains("'a' and 'b'"));
+  CHECK_THAT(complaint("boards:\n  - {name: a, " + place + ", size: 1}\n"), Contains("boards[0].size"));
 }

@@ -153,13 +153,13 @@ TEST_CASE("a camera beside the arm sees the same, wherever the arm is; without a
   const auto fixed = cell_with("camera.fixed=1");
   const auto before = fixed->color().poll(at(1));
   REQUIRE(before.has_value());
-  const auto corners = fixed->color().read_corners(*before);
+  const auto corners = fixed->color().read_corners(*before, 0);
   REQUIRE(corners.has_value());
   REQUIRE_FALSE(corners->corners_px.empty());
   turn_base(*fixed, 1.5, at(1));
   const auto after = fixed->color().poll(at(6));
   REQUIRE(after.has_value());
-  const auto again = fixed->color().read_corners(*after);
+  const auto again = fixed->color().read_corners(*after, 0);
   REQUIRE(again.has_value());
   REQUIRE(again->corners_px.size() == corners->corners_px.size());
   for (std::size_t i = 0; i < again->corners_px.size(); ++i) {
@@ -169,7 +169,7 @@ TEST_CASE("a camera beside the arm sees the same, wherever the arm is; without a
   const auto absent = cell_with("camera.fixed=1,board.absent=1");
   const auto frame = absent->color().poll(at(1));
   REQUIRE(frame.has_value());
-  CHECK(absent->color().read_corners(*frame)->corners_px.empty());
+  CHECK(absent->color().read_corners(*frame, 0)->corners_px.empty());
 }
 
 TEST_CASE("the true camera stays inside the envelope that is assumed before calibration", "[sim][cell]") {

@@ -15,7 +15,7 @@ TEST_CASE("random cells keep the safe zone clear, the start free and the board i
     REQUIRE(scene);
     CHECK(check_cell(*scene));
     Scene board_counts = *scene;
-    board_counts.board_solid = scene->solids.size();
+    board_counts.boards.clear();
     CHECK(check_cell(board_counts));
     const auto objects =
         std::ranges::count_if(scene->solids, [](const Solid& s) { return s.name == "box" || s.name == "cylinder"; });
@@ -38,6 +38,6 @@ TEST_CASE("a random cell is the same for the same seeds and another for others")
     CHECK(one->solids[i].base_T_solid.matrix() == again->solids[i].base_T_solid.matrix());
   }
   CHECK(one->mount.link_T_camera.matrix() == again->mount.link_T_camera.matrix());
-  CHECK(one->board.base_T_board.pose().matrix() != next->board.base_T_board.pose().matrix());
+  CHECK(one->boards.front().base_T_board.pose().matrix() != next->boards.front().base_T_board.pose().matrix());
   CHECK(one->mount.link_T_camera.matrix() != assembled_anew->mount.link_T_camera.matrix());
 }

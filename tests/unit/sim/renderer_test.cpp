@@ -27,7 +27,7 @@ Solid box(const Vector3d& center, const Vector3d& size) {
 Scene wall_scene(double distance_m) {
   Scene scene;
   scene.mount = default_mount(6);
-  scene.solids = {board_panel(scene.board), box({0, 0, distance_m + 0.05}, {20, 20, 0.1})};
+  scene.solids = {board_panel(scene.boards.front()), box({0, 0, distance_m + 0.05}, {20, 20, 0.1})};
   move_board(scene, Transform<Base, Board>(Eigen::Quaterniond::Identity(), {0, 0, -5}));  // out of sight
   return scene;
 }
@@ -172,12 +172,12 @@ TEST_CASE("rendered boards are found, and their corners are where the camera mod
     const Transform<Base, Camera> pose = frames.flange() * scene->mount.flange_T_camera();
     renderer.render_color(pose, {place(true_body(arm), frames), 1, i}, {pixels.data(), camera.width, camera.height});
     const Result<CornerSet> corners =
-        detect_checkerboard({pixels.data(), camera.width, camera.height}, scene->board.spec);
+        detect_checkerboard({pixels.data(), camera.width, camera.height}, scene->boards.front().spec);
     INFO("view " << i);
     REQUIRE(corners);
-    const Transform<Camera, Board> camera_T_board = pose.inverse() * scene->board.base_T_board;
-    for (int k = 0; k < scene->board.spec.corners(); ++k) {
-      const auto truth = project(camera, camera_T_board * scene->board.spec.corner(k));
+    const Transform<Camera, Board> camera_T_board = pose.inverse() * scene->boards.front().base_T_board;
+    for (int k = 0; k < scene->boards.front().spec.corners(); ++k) {
+      const auto truth = project(camera, camera_T_board * scene->boards.front().spec.corner(k));
       REQUIRE(truth);
       squares += (corners->corners_px[static_cast<std::size_t>(k)] - *truth).squaredNorm();
       count += 2;
@@ -194,13 +194,13 @@ TEST_CASE("observed corners scatter about the truth by their sigma, and are miss
   REQUIRE_FALSE(views.empty());
   const Transform<Base, Camera> pose = forward(arm, views[0]).flange() * scene->mount.flange_T_camera();
   const Renderer renderer(*scene);
-  const Transform<Camera, Board> camera_T_board = pose.inverse() * scene->board.base_T_board;
+  const Transform<Camera, Board> camera_T_board = pose.inverse() * scene->boards.front().base_T_board;
   double sum = 0, squares = 0, count = 0;
   for (std::uint64_t frame = 0; frame < 50; ++frame) {
     const hal::CornerObservation seen = renderer.observe_corners(pose, {{}, 1, frame});
     REQUIRE(seen.corners_px.size() == 54);
     for (int k = 0; k < 54; ++k) {
-      const auto truth = project(scene->mount.color, camera_T_board * scene->board.spec.corner(k));
+      const auto truth = project(scene->mount.color, camera_T_board * scene->boards.front().spec.corner(k));
       const double d = seen.corners_px[static_cast<std::size_t>(k)][0] - truth->x();
       sum += d, squares += d * d, ++count;
     }
@@ -208,7 +208,7 @@ TEST_CASE("observed corners scatter about the truth by their sigma, and are miss
   CHECK(std::abs(sum / count) < 0.01);
   CHECK(std::sqrt(squares / count) == Approx(0.1).epsilon(0.06));
 
-  const Vector3d center = scene->board.base_T_board * scene->board.spec.center();
+  const Vector3d center = scene->boards.front().base_T_board * scene->boards.front().spec.center();
   const Vector3d between = 0.5 * (center + pose.translation());
   Scene hidden = *scene;
   hidden.solids.push_back(box(between, {0.03, 0.03, 0.03}));

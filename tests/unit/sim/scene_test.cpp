@@ -136,7 +136,7 @@ TEST_CASE("a wall on a voxel boundary occupies one side only") {
 
 TEST_CASE("the board's panel lies behind its front and moves with it") {
   Scene scene;
-  scene.solids = {board_panel(scene.board)};
+  scene.solids = {board_panel(scene.boards.front())};
   const Vector3d before = Vector3d(0.12, 0.07, 0.001);
   CHECK(inside(scene, before));
   CHECK_FALSE(inside(scene, Vector3d(0.12, 0.07, -0.001)));

@@ -30,7 +30,7 @@ Result<Scene> cell_with(const std::string& board, const std::string& more = {}) 
 
 /// Half a metre before the board's middle, a little to the side, looking at it.
 Transform<Base, Camera> looking_at(const Scene& scene) {
-  const Eigen::Vector3d center = scene.board.base_T_board * scene.board.spec.center();
+  const Eigen::Vector3d center = scene.boards.front().base_T_board * scene.boards.front().spec.center();
   const Eigen::Vector3d eye = center + Eigen::Vector3d(-0.5, 0.12, 0.08), z = (center - eye).normalized();
   const Eigen::Vector3d y = (-Eigen::Vector3d::UnitZ() + z.z() * z).normalized();
   Pose pose = Pose::Identity();
@@ -50,10 +50,10 @@ Seen look(const Scene& scene) {
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
   const auto pose = looking_at(scene);
   renderer.render_color(pose, {{}, 1, 1}, {pixels.data(), camera.width, camera.height});
-  const BoardSpec& board = scene.board.spec;
+  const BoardSpec& board = scene.boards.front().spec;
   Seen seen{detect_target({pixels.data(), camera.width, camera.height}, board)};
   if (!seen.corners) return seen;
-  const auto camera_T_board = pose.inverse() * scene.board.base_T_board;
+  const auto camera_T_board = pose.inverse() * scene.boards.front().base_T_board;
   const double n = static_cast<double>(seen.corners->corners_px.size());
   double turned = 0;
   for (std::size_t i = 0; i < seen.corners->corners_px.size(); ++i) {
@@ -79,18 +79,19 @@ TEST_CASE("every target stands in a cell, is rendered, and found where it is") {
     CHECK(seen.rms_px < 0.06);
     // --sensor fast: the same points, projected.
     const auto projected = Renderer(*scene).observe_corners(looking_at(*scene), {{}, 1, 1});
-    CHECK(projected.corners_px.size() == static_cast<std::size_t>(scene->board.spec.corners()));
+    CHECK(projected.corners_px.size() == static_cast<std::size_t>(scene->boards.front().spec.corners()));
   }
 }
 
 TEST_CASE("a board of somebody's own hangs where the cell's was") {
   auto scene = cell_with("roll_deg: 90");
   REQUIRE(scene);
-  const BoardPlacement before = scene->board;
+  const BoardPlacement before = scene->boards.front();
   exchange_board(*scene, target_from_words({"apriltag", 4, 3, 0.07}).value());
-  CHECK((scene->board.base_T_board * scene->board.spec.center() - before.base_T_board * before.spec.center()).norm() <
-        1e-12);
-  CHECK((scene->board.base_T_board.rotation() - before.base_T_board.rotation()).norm() < 1e-12);
+  CHECK((scene->boards.front().base_T_board * scene->boards.front().spec.center() -
+         before.base_T_board * before.spec.center())
+            .norm() < 1e-12);
+  CHECK((scene->boards.front().base_T_board.rotation() - before.base_T_board.rotation()).norm() < 1e-12);
   const Seen seen = look(*scene);
   REQUIRE(seen.corners);
   CHECK(seen.rms_px < 0.06);
@@ -105,7 +106,7 @@ TEST_CASE("a thing in front of a board of markers hides a part, and only that") 
     const Seen seen = look(*scene);
     REQUIRE(seen.corners);
     CHECK_FALSE(seen.corners->ids.empty());
-    CHECK(seen.corners->ids.size() >= static_cast<std::size_t>(scene->board.spec.corners() / 3));
+    CHECK(seen.corners->ids.size() >= static_cast<std::size_t>(scene->boards.front().spec.corners() / 3));
     CHECK(seen.rms_px < 0.12);
   }
   const auto circles = cell_with(kTypes[0], rod);
@@ -117,4 +118,37 @@ TEST_CASE("a board that cannot be is refused with its place") {
   REQUIRE_FALSE(wrong);
   CHECK(wrong.error().detail().find("ends with 49") != std::string::npos);
   CHECK_FALSE(cell_with("type: chess"));
+}
+
+TEST_CASE("two boards in one picture are drawn each with its own pattern, where they are") {
+  const auto scene = parse_cell(
+      "walls: {low_m: [-2, -2], high_m: [2, 2]}\n"
+      "boards:\n"
+      "  - {name: left, center_m: [0.9, 0.17, 0.3], faces: [-1, 0, 0], inner_columns: 7, inner_rows: 4, "
+      "square_size_m: 0.03}\n"
+      "  - {name: right, center_m: [0.9, -0.17, 0.3], faces: [-1, 0.2, 0], type: apriltag, inner_columns: 4, "
+      "inner_rows: 3, square_size_m: 0.06}\n",
+      "cell.yaml", 1);
+  REQUIRE(scene);
+  Pose eye = Pose::Identity();  // looks along x
+  eye.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  eye.translation() = Eigen::Vector3d(0.2, 0, 0.3);
+  const Transform<Base, Camera> base_T_camera(eye);
+  const Renderer renderer(*scene);
+  const CameraIntrinsics& camera = scene->mount.color;
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
+  renderer.render_color(base_T_camera, {{}, 1, 1}, {pixels.data(), camera.width, camera.height});
+  for (std::size_t k = 0; k < 2; ++k) {
+    const BoardPlacement& board = scene->boards[k];
+    const auto seen = detect_target({pixels.data(), camera.width, camera.height}, board.spec);
+    REQUIRE(seen);
+    const auto exact = renderer.observe_corners(base_T_camera, {{}, 1, 1}, k, 0);
+    REQUIRE(exact.corners_px.size() == static_cast<std::size_t>(board.spec.corners()));
+    double squared = 0;
+    for (std::size_t i = 0; i < seen->corners_px.size(); ++i) {
+      const auto& at = exact.corners_px[static_cast<std::size_t>(point_of(seen->ids, i))];
+      squared += (seen->corners_px[i] - Eigen::Vector2d(at[0], at[1])).squaredNorm();
+    }
+    CHECK(std::sqrt(squared / static_cast<double>(seen->corners_px.size())) < 0.15);
+  }
 }

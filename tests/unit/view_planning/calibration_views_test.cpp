@@ -38,7 +38,7 @@ TEST_CASE("views are chosen that see the board from the safe zone and make the h
   CalibrationViewOptions options;
   PredictedSigma sigma;
   for (options.step = 0; options.step < 10; ++options.step) {
-    const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, belief, information, taken};
+    const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, {&belief, 1}, information, taken};
     const auto choice = next_calibration_view(inputs, planner, at, options);
     REQUIRE(choice);
     INFO("step " << options.step << " feasible " << choice->feasible << " of " << choice->considered);
@@ -63,7 +63,7 @@ TEST_CASE("one seed gives one calibration view, another gives another", "[calibr
   const FreeSpace space;
   Planner planner;
   const Matrix12d information = prior_information();
-  const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, belief, information, {}};
+  const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, {&belief, 1}, information, {}};
   CalibrationViewOptions options;
   const auto a = next_calibration_view(inputs, planner, default_start(kUr5), options);
   const auto b = next_calibration_view(inputs, planner, default_start(kUr5), options);
@@ -80,7 +80,7 @@ TEST_CASE("a board that cannot be seen has no view", "[calibration_views]") {
   const FreeSpace space;
   Planner planner;
   const Matrix12d information = prior_information();
-  const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, belief, information, {}};
+  const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, {&belief, 1}, information, {}};
   const auto choice = next_calibration_view(inputs, planner, default_start(kUr5));
   REQUIRE(choice);
   REQUIRE(choice->outcome == CalibrationViewChoice::Outcome::kNoneFeasible);
@@ -91,7 +91,7 @@ TEST_CASE("when all is known no view helps", "[calibration_views]") {
   Planner planner;
   const Matrix12d information = 1e16 * Matrix12d::Identity();
   const ViewDesignModel belief = model();
-  const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, belief, information, {}};
+  const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, {&belief, 1}, information, {}};
   const auto choice = next_calibration_view(inputs, planner, default_start(kUr5));
   REQUIRE(choice);
   REQUIRE(choice->outcome == CalibrationViewChoice::Outcome::kNoneHelps);
@@ -130,4 +130,32 @@ TEST_CASE("first views turn about different axes and are certified", "[calibrati
   };
   REQUIRE(std::abs(axis((*views)[0]).dot(axis((*views)[1]))) < 0.9);
   for (const JointVector& q : *views) REQUIRE(certify(kUr5, kBody, space, kClearance, at, q).certified());
+}
+
+TEST_CASE("a target that is wanted is looked at, and placed by few views", "[calibration_views]") {
+  std::vector<ViewDesignModel> two(2, model());
+  two[1].board = {7, 4, 0.04};
+  const Pose turn(Eigen::AngleAxisd(1.3, Eigen::Vector3d::UnitZ()));  // another side of the arm
+  two[1].base_T_board = Transform<Base, Board>(turn * two[1].base_T_board.pose());
+  const FreeSpace space;
+  Planner planner;
+  JointVector at = default_start(kUr5);
+  Eigen::MatrixXd information = joint_prior_information(2);
+  std::vector<JointVector> taken;
+  CalibrationViewOptions options;
+  options.wanted = 2;
+  for (options.step = 0; options.step < 3; ++options.step) {
+    const CalibrationViewInputs inputs{kUr5, kBody, space, kClearance, two, information, taken};
+    const auto choice = next_calibration_view(inputs, planner, at, options);
+    REQUIRE(choice);
+    REQUIRE(choice->outcome == CalibrationViewChoice::Outcome::kChosen);
+    CHECK((choice->shown & 2U) != 0);
+    CHECK(check_view(two[1], forward(kUr5, choice->target).flange(), options.limits) == ViewFault::kNone);
+    at = choice->target;
+    taken.push_back(at);
+    information += joint_view_information(two, choice->shown, forward(kUr5, at).flange());
+  }
+  // Nobody asked for the first one, and it is out of sight from there.
+  const Eigen::MatrixXd covariance = predicted_joint(information);
+  CHECK(covariance.block<3, 3>(12, 12).trace() < 1e-3 * covariance.block<3, 3>(6, 6).trace());
 }

@@ -70,7 +70,7 @@ TEST_CASE("the arm goes through the fixed list in order, leaves out what it cann
   int next = 0;
   std::set<int> numbers;
   for (;;) {
-    const CalibrationViewInputs inputs{arm, body, space, clearance, model, information, taken};
+    const CalibrationViewInputs inputs{arm, body, space, clearance, {&model, 1}, information, taken};
     const int before = next;
     const auto choice = next_fixed_view(inputs, planner, at, next);
     REQUIRE(choice);
