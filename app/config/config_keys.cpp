@@ -306,6 +306,9 @@ std::string broken_rule(const Config& c) {
     return "calibration.views: fixed48 takes 48 views after the 4 that find the camera: set calibration.views_max to "
            "52";
   }
+  if (c.calibration.views == "fixed48" && c.boards.size() > 1) {
+    return "calibration.views: fixed48 moves one board over the picture: give 'board' instead of 'boards'";
+  }
   if (c.calibration.views_min > c.calibration.views_max) {
     return "calibration.views_min must not exceed calibration.views_max";
   }

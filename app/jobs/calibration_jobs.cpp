@@ -146,7 +146,7 @@ Eigen::MatrixXd Workbench::information_of(const RoughModel& rough, std::span<con
 
 /// A target that was seen from few places is placed by them alone: it gets some views for its own sake, unless they do
 /// not show it.
-std::uint32_t Workbench::wanted_targets(const RoughModel& rough) const {
+std::uint32_t Workbench::wanted_targets(const RoughModel& rough, std::span<const std::size_t> observations) const {
   constexpr std::ptrdiff_t kViewsWanted = 4;
   constexpr int kTriesMax = 6;
   if (boards_.size() == 1) return 0;
@@ -154,7 +154,7 @@ std::uint32_t Workbench::wanted_targets(const RoughModel& rough) const {
   for (std::size_t m = 0; m < rough.targets.size(); ++m) {
     const int target = rough.targets[m];
     const auto views =
-        std::ranges::count_if(observations_, [&](const Observation& o) { return o.view.target == target; });
+        std::ranges::count_if(observations, [&](std::size_t i) { return observations_[i].view.target == target; });
     if (views < kViewsWanted && sought_[static_cast<std::size_t>(target)] < kTriesMax) wanted |= 1U << m;
   }
   return wanted;
@@ -205,7 +205,7 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   options.step = here.step;
   options.speed = limits_;
   const bool fixed = config_.calibration.views == "fixed48";
-  options.wanted = fixed ? 0 : wanted_targets(*rough);
+  options.wanted = fixed ? 0 : wanted_targets(*rough, counted);
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
   const CalibrationViewInputs inputs{

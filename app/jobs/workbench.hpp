@@ -213,8 +213,8 @@ class Workbench {
   /// Information of the observations named, about the targets of the models.
   [[nodiscard]] Eigen::MatrixXd information_of(const RoughModel& rough,
                                                std::span<const std::size_t> observations) const;
-  /// Of the models, those whose targets want more views.
-  [[nodiscard]] std::uint32_t wanted_targets(const RoughModel& rough) const;
+  /// Of the models, those whose targets want more views than the observations named.
+  [[nodiscard]] std::uint32_t wanted_targets(const RoughModel& rough, std::span<const std::size_t> observations) const;
   [[nodiscard]] std::optional<RoughModel> rough_model() const;
   [[nodiscard]] bool estimates_intrinsics() const { return config_.calibration.intrinsics == "estimate"; }
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);

@@ -24,6 +24,8 @@ struct Ending {
   Outcome outcome = Outcome::kDone;
   bool has_fault = false;
   Fault fault = Fault::kInternal;
+  /// For kCameraOnInnerLink the links, counted from 1, of which one carries the camera.
+  int camera_link_low = 0, camera_link_high = 0;
 };
 
 /// Receiver of decisions, one call each, in order.

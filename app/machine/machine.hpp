@@ -50,6 +50,7 @@ struct Progress {
   std::uint32_t observations = 0;  ///< views of the board taken for the calibration
   std::uint32_t failed_looks = 0;  ///< in a row, at calibration views
   std::uint32_t still_images = 0;  ///< joints that moved without moving the image
+  int still_joint = 0;             ///< the innermost of them
   std::uint32_t steps = 0;         ///< of the current state: seeds its candidates
   std::uint32_t sweep_views = 0;
   std::uint32_t explore_views = 0;

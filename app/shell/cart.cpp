@@ -30,10 +30,23 @@ bool is_phase(StateId state) {
   return !has_phases(state) && (parent == StateId::kNone || has_phases(parent));
 }
 
+/// Which link carries the camera, as far as the joints told it, and what no views from there could tell.
+std::string camera_link_text(const Ending& ending) {
+  std::string text = fmt::format(": it is on link {}", ending.camera_link_low);
+  if (ending.camera_link_high > ending.camera_link_low) text += fmt::format(" to {}", ending.camera_link_high);
+  if (ending.camera_link_low == 1) {
+    text +=
+        "; on link 1 joint 1 alone moves it, and views about one axis leave its place along that axis and its turn "
+        "about it open";
+  }
+  return text + "; mount it on the flange";
+}
+
 std::string reason_text(const RunRecord& record, const Ending& ending) {
   if (!ending.has_fault) return done_text(record);
   const FaultRow& row = fault_row(ending.fault);
-  return fmt::format("E{} {}", static_cast<int>(ending.fault), row.text);
+  const std::string where = ending.camera_link_low > 0 ? camera_link_text(ending) : std::string();
+  return fmt::format("E{} {}{}", static_cast<int>(ending.fault), row.text, where);
 }
 
 }  // namespace

@@ -148,7 +148,7 @@ class ScriptedWorld : public DecisionSink {
         return pack(r, result);
       }
       case JobKind::kDetectBoard:
-        return pack(detect(arguments_of<DetectArguments>(arguments)), result);
+        return pack(detected(arguments_of<DetectArguments>(arguments)), result);
       case JobKind::kNextCalibrationView: {
         CalibrationViewResult r;
         r.found = true;
@@ -247,6 +247,12 @@ class ScriptedWorld : public DecisionSink {
     T value;
     ENSURE(9001, unpack(arguments, value));
     return value;
+  }
+  /// Who looks for one board has seen that one.
+  [[nodiscard]] DetectResult detected(const DetectArguments& arguments) const {
+    DetectResult r = detect(arguments);
+    if (r.found && r.targets == 0) r.targets = 1;
+    return r;
   }
   static ViewList views_around(const JointVector& at, int count) {
     ViewList list;

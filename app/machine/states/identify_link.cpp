@@ -61,6 +61,8 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
         m.transition(StateId::kCollect);
       } else {
         m.conclude(Outcome::kCalibrationRejected, Fault::kCameraOnInnerLink);
+        p.ending.camera_link_low = motion_joint(m) + 1;
+        p.ending.camera_link_high = p.still_joint;
       }
     } else {
       // Each joint is turned to both sides at most: to the other one only when the board left the view on the first.
@@ -68,6 +70,7 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
       ++p.view;
       if (seen->found) {
         ++p.still_images;
+        p.still_joint = joint;
         while (p.view < p.views.views_rad.size() && motion_joint(m) == joint) ++p.view;
       }
       next_motion(m);

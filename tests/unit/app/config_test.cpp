@@ -269,7 +269,9 @@ TEST_CASE("several boards are read strictly, printed, and read back", "[app][con
   CHECK(parse_config(printed, "printed.yaml").value() == *config);
   CHECK_THAT(print_config(Config{}), Contains("boards: []"));
 
-  const auto complaint = [](const std::string& yaml) { return std::string(parse_config(yaml, "a.yaml").error().detail()); };
+  const auto complaint = [](const std::string& yaml) {
+    return std::string(parse_config(yaml, "a.yaml").error().detail());
+  };
   CHECK_THAT(complaint(two + "board: {inner_rows: 7}\n"), Contains("'board' and 'boards'"));
   CHECK_THAT(complaint("boards:\n  - {name: a}\n  - {name: b}\n"), Contains("'a' and 'b'") && Contains("9x6"));
   CHECK_THAT(complaint("boards:\n  - {name: a}\n  - {name: a, type: apriltag}\n"), Contains("named 'a'"));

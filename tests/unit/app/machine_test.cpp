@@ -74,6 +74,30 @@ TEST_CASE("a camera that no joint moves is reported", "[machine]") {
   CHECK(world.ending.fault == Fault::kCameraNotOnArm);
 }
 
+TEST_CASE("a camera on an inner link is named", "[machine]") {
+  ScriptedWorld world;
+  const int link = GENERATE(1, 3, 5);
+  const bool lost = GENERATE(false, true);  // the joint that tells two links apart takes the board out of view
+  world.detect = [=](const DetectArguments& a) {
+    const int joint = 6 - static_cast<int>(a.view);  // from the last inwards
+    DetectResult r;
+    r.found = a.purpose != BoardLook::kIdentify || !lost || joint != link;
+    r.changed = a.purpose == BoardLook::kIdentify && joint <= link;
+    return r;
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+  if (link == 1 && lost) {
+    CHECK(world.ending.fault == Fault::kCameraNotOnArm);
+    return;
+  }
+  CHECK(world.ending.fault == Fault::kCameraOnInnerLink);
+  CHECK(world.ending.camera_link_low == (lost ? link - 1 : link));
+  CHECK(world.ending.camera_link_high == link);
+}
+
 TEST_CASE("a board that every test motion loses says nothing about the camera's link", "[machine]") {
   ScriptedWorld world;
   int motions = 0;

@@ -68,12 +68,13 @@ TEST_CASE("which views show the board well", "[calibration]") {
   CHECK(check_view(model, flange_seeing(3.0, 0, 0), far) == ViewFault::kSpacing);
 }
 
-TEST_CASE("information of several targets: a second one in the same picture shares the arm's deviation", "[calibration]") {
+TEST_CASE("information of several targets: a second one in the same picture shares the arm's deviation",
+          "[calibration]") {
   const Setup setup;
   std::vector<ViewDesignModel> two(2, setup.model());
   two[1].board = {7, 4, 0.04};
-  two[1].base_T_board =
-      Transform<Base, Board>(setup.base_T_board * Pose(Eigen::Translation3d(0.05, 0.02, 0.03)) * Pose(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ())));
+  two[1].base_T_board = Transform<Base, Board>(setup.base_T_board * Pose(Eigen::Translation3d(0.05, 0.02, 0.03)) *
+                                               Pose(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ())));
   Random random(35);
   std::vector<Transform<Base, Flange>> flanges;
   for (int i = 0; i < 8; ++i) flanges.push_back(candidate(setup, random));
@@ -96,8 +97,8 @@ TEST_CASE("information of several targets: a second one in the same picture shar
   CHECK(both > design_cost(predicted_hand_eye(apart)));
   // What one place sees of both is known of each other without the arm: their mutual place better than in base.
   const Eigen::MatrixXd joint = predicted_joint(sum(3));
-  const Eigen::Matrix3d apart_t = joint.block<3, 3>(6, 6) + joint.block<3, 3>(12, 12) - joint.block<3, 3>(6, 12) -
-                                  joint.block<3, 3>(12, 6);
+  const Eigen::Matrix3d apart_t =
+      joint.block<3, 3>(6, 6) + joint.block<3, 3>(12, 12) - joint.block<3, 3>(6, 12) - joint.block<3, 3>(12, 6);
   CHECK(apart_t.trace() < joint.block<3, 3>(6, 6).trace() + joint.block<3, 3>(12, 12).trace());
   // The only view of a target tells nothing of the camera.
   const Eigen::MatrixXd once = sum(1) + joint_view_information(two, 2, flanges[0]);

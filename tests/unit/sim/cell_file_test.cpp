@@ -144,7 +144,8 @@ TEST_CASE("several boards hang in a cell, each with its panel; sets that cannot 
   CHECK((two->boards[1].base_T_board * two->boards[1].spec.center()).isApprox(Eigen::Vector3d(0, 0.9, 0.3)));
   Scene moved = *two;
   move_board(moved, Transform<Base, Board>(Eigen::Quaterniond::Identity(), {0, 0, -5}), 1);
-  CHECK_FALSE(inside(moved, two->boards[1].base_T_board * (two->boards[1].spec.center() + Eigen::Vector3d(0, 0, 0.002))));
+  CHECK_FALSE(
+      inside(moved, two->boards[1].base_T_board * (two->boards[1].spec.center() + Eigen::Vector3d(0, 0, 0.002))));
   CHECK(moved.boards[0].base_T_board.pose().matrix() == two->boards[0].base_T_board.pose().matrix());
 
   CHECK_THAT(complaint(kBoard + "boards: []\n"), Contains("either 'board' or 'boards'"));
