@@ -77,7 +77,6 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
   set_board(cell.board, config.board);
-  config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
         {{box.low_m.x(), box.low_m.y(), box.low_m.z()}, {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
@@ -108,7 +107,10 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
     claims.color_offset_s = bench.alignment().color_stamps.offset_s;
     claims.depth_offset_s = bench.alignment().depth_stamps.offset_s;
   }
-  if (bench.mapped()) claims.map = &bench.map();
+  if (bench.mapped()) {
+    claims.map = &bench.map();
+    claims.reach_zone = bench.zone();
+  }
   claims.now_s = bench.last_stamp_s();
   claims.free_max_age_s = config.map.free_max_age_s;
   if (bench.clearance_terms()) claims.observable.clearance = bench.clearance_terms()->clearance();
@@ -129,6 +131,7 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
   truth.unknown_entries = figures.unknown_entries;
   truth.coverage_of_observable = figures.coverage_of_observable;
   truth.false_free_voxels = figures.false_free_voxels;
+  truth.false_occupied_fraction = figures.false_occupied_fraction;
   if (claims.map == nullptr) return;
   const VoxelMap swept = bench.map_after_sweep();
   claims.map = &swept;
@@ -231,7 +234,7 @@ int run_job(const RunCommand& command) {
   std::optional<BoardSpec> board;  // load_config has refused what is no board
   if (names_a_board(config.board)) board = board_of(config.board).value();
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, board});
+                                        command.faults, config.workers, board, config.depth.sensor});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);

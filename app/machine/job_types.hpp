@@ -134,9 +134,11 @@ struct PlanResult {
 struct PosedFrame {
   hal::Frame frame;
   JointVector at_rad;
+  JointVector velocity_rad_s{};  ///< between the reports before and after the stamp
+  double reports_apart_s = 0;    ///< of these two
   template <typename Archive>
   void fields(Archive& a) {
-    a(frame.stamp, frame.sequence, frame.slot, at_rad);
+    a(frame.stamp, frame.sequence, frame.slot, at_rad, velocity_rad_s, reports_apart_s);
   }
 };
 

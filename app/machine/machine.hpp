@@ -68,6 +68,8 @@ class Machine {
 
   [[nodiscard]] StateId state() const { return state_; }
   [[nodiscard]] bool finished() const { return finished_; }
+  /// Depth frames that the map would have taken, had the arm's joints at their stamps been known (safety rule 10).
+  [[nodiscard]] std::uint64_t depth_frames_unposed() const { return depth_frames_unposed_; }
 
   // What the states use.
   [[nodiscard]] Instant now() const { return now_; }
@@ -153,11 +155,11 @@ class Machine {
   void enter_path_to(StateId target);
   void remember_arm(const ArmReported& report);
   template <typename Frames>
-  [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending);
+  [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending, std::uint64_t& unposed);
   void pose_pending_frames();
   void note_way_frame(const MachineEvent& event);
   void see_way_frames();
-  [[nodiscard]] std::optional<JointVector> joints_at(Instant stamp) const;
+  [[nodiscard]] std::optional<PosedFrame> posed(const hal::Frame& frame) const;
   void send_leg();
   [[nodiscard]] double deviation_m() const;
   [[nodiscard]] Route legs_ahead() const;
@@ -184,6 +186,7 @@ class Machine {
   PendingFrames pending_color_, pending_depth_;
   Duration color_offset_{}, depth_offset_{};
   Instant last_depth_{};
+  std::uint64_t depth_frames_unposed_ = 0;
 
   std::uint32_t job_number_ = 0;
   std::uint32_t awaited_ = 0;

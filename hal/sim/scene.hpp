@@ -65,7 +65,8 @@ struct CameraMount {
   Pose link_T_camera = Pose::Identity();  ///< with link 0: base_T_camera
   Transform<Camera, Depth> camera_T_depth;
   CameraIntrinsics color;
-  CameraIntrinsics depth;  ///< of the full frame; without distortion
+  CameraIntrinsics depth;       ///< of the full frame; without distortion
+  bool depth_is_given = false;  ///< by the cell: the sensor that is asked for does not replace it
 
   [[nodiscard]] bool on_arm() const { return link > 0; }
   /// The transform that the calibration looks for. Only for a camera on the flange.

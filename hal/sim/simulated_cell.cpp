@@ -82,9 +82,6 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
   d.start_rad = scene.start_rad;
   d.color = stated_intrinsics(scene.mount.color, faults);
   d.depth = renderer.depth_intrinsics(detail);
-  d.depth_range_min_m = renderer.sensor().range_min_m;
-  d.depth_range_max_m = renderer.sensor().range_max_m;
-  d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
   d.camera_T_depth = stated_mount(scene.mount.camera_T_depth, faults);
   d.board = scene.board.spec;
   d.cart_top_m = scene.safe_zone.floor_m;
@@ -124,8 +121,9 @@ SimulatedArmOptions arm_options(const Scene& scene, const ArmModel& model, const
 
 class Cell final : public SimulatedCell {
  public:
-  Cell(const Scene& loaded, const ArmModel& model, const Faults& faults, const SimulationOptions& options)
-      : scenes_(loaded, faults),
+  Cell(const Scene& loaded, const DepthSensorModel& sensor, const ArmModel& model, const Faults& faults,
+       const SimulationOptions& options)
+      : scenes_(loaded, sensor, faults),
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
         description_(describe_cell(scene_, first_.renderer, faults, detail(options))),
@@ -179,7 +177,10 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   if (scene->start_rad.size() != model->joints) {
     return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, model->joints);
   }
-  return std::make_unique<Cell>(*scene, *model, *faults, options);
+  const std::optional<SensorPreset> sensor = find_sensor_preset(options.sensor);
+  if (!sensor) return failure(Fault::kUsage, "no depth sensor '{}'", options.sensor);
+  if (!scene->mount.depth_is_given) scene->mount.depth = sensor->intrinsics;
+  return std::make_unique<Cell>(*scene, depth_sensor_model(*sensor), *model, *faults, options);
 }
 
 }  // namespace firstlook::sim
