@@ -10,12 +10,10 @@ using test::ProgramResult;
 namespace {
 
 /// A job with a short exploration and these keys besides.
-Json run_with(const std::string& config, const std::vector<std::string>& more = {}) {
+Json run_with(const std::string& config) {
   const JobFolder folder;
   folder.write("keys.yaml", "explore: {views_max: 3}\n" + config);
-  std::vector<std::string> words = {"--config", "keys.yaml"};
-  words.insert(words.end(), more.begin(), more.end());
-  const ProgramResult run = folder.run_job("run", words);
+  const ProgramResult run = folder.run_job("run", {"--config", "keys.yaml"});
   INFO(config << "\n" << run.err);
   CHECK(run.exit_code == 0);
   Json result = folder.read_json("run/result.json");
@@ -57,14 +55,6 @@ TEST_CASE("options of the map are off by default and do what they say", "[scenar
   const Json& fine = all["mapping"]["fine"]["voxels"];
   CHECK(fine["free"].get<int>() + fine["occupied"].get<int>() + fine["unknown"].get<int>() == 60 * 60 * 60);
   CHECK(fine["free"].get<int>() > 10000);
-}
-
-TEST_CASE("in the hall holes that two poses agree on clear more than returns alone", "[scenario]") {
-  const std::vector<std::string> hall = {"--cell", "hall"};
-  const Json ignored = run_with("", hall);
-  const Json corroborated = run_with("map: {holes: clear_when_corroborated}\n", hall);
-  CHECK(corroborated["mapping"]["holes"]["voxels_cleared"].get<int>() > 0);
-  CHECK(corroborated["mapping"]["voxels"]["unknown"].get<int>() < ignored["mapping"]["voxels"]["unknown"].get<int>());
 }
 
 }  // namespace firstlook
