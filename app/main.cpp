@@ -291,6 +291,7 @@ struct Dispatch {
   int operator()(const RunCommand& c) const { return run_job(c); }
   int operator()(const CalibrateCommandOptions& c) const { return run_calibrate_command(c); }
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
+  int operator()(const ExportCommandOptions& c) const { return run_export_command(c); }
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {

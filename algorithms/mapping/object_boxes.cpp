@@ -14,12 +14,12 @@ namespace {
 
 // How much smaller a turned or tilted box must be to be worth it.
 constexpr double kTurnedWorth = 0.85, kTiltedWorth = 0.7;
-constexpr double kSurface_m = 0.04;       // scatter of a surface in the map, or one and a half voxels where that is more
-constexpr double kFlatSide = 2.5;         // a plane's second edge over its thickness, at least
-constexpr double kFlatCover = 0.4;        // of a plane's rectangle
-constexpr double kFaceCover = 0.6;        // of a box's closed face
-constexpr double kNearFaces = 0.9;        // of a box's voxels
-constexpr double kFreeInsideMax = 0.2;    // of a box's inside
+constexpr double kSurface_m = 0.04;     // scatter of a surface in the map, or one and a half voxels where that is more
+constexpr double kFlatSide = 2.5;       // a plane's second edge over its thickness, at least
+constexpr double kFlatCover = 0.4;      // of a plane's rectangle
+constexpr double kFaceCover = 0.6;      // of a box's closed face
+constexpr double kNearFaces = 0.9;      // of a box's voxels
+constexpr double kFreeInsideMax = 0.2;  // of a box's inside
 
 double surface_m(double resolution_m) { return std::max(kSurface_m, 1.5 * resolution_m); }
 
@@ -55,8 +55,7 @@ Eigen::Matrix3d turned(const Eigen::Matrix3d& axes, std::span<const Eigen::Vecto
     const Eigen::Vector2d size = (high - low).array() + resolution_m;
     if (size.prod() < best_m2 - 1e-12) best_m2 = size.prod(), best_degrees = degrees;
   }
-  return axes *
-         Eigen::AngleAxisd(best_degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return axes * Eigen::AngleAxisd(best_degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
 /// Principal axes, the flattest direction last and upwards.
@@ -129,9 +128,9 @@ bool is_plane(std::span<const Eigen::Vector3d> in_box_m, const OrientedBox& box,
 
 bool is_box(std::span<const Eigen::Vector3d> in_box_m, const OrientedBox& box, const VoxelMap& map) {
   const double resolution_m = map.geometry().resolution_m, near_m = surface_m(resolution_m) + resolution_m / 2;
+  if (box.size_m.minCoeff() < 3 * resolution_m - 1e-9) return false;  // smaller ones have no inside
   std::size_t near_faces = 0;
-  for (const Eigen::Vector3d& p : in_box_m)
-    near_faces += (box.size_m / 2 - p.cwiseAbs()).minCoeff() <= near_m;
+  for (const Eigen::Vector3d& p : in_box_m) near_faces += (box.size_m / 2 - p.cwiseAbs()).minCoeff() <= near_m;
   const double voxels = static_cast<double>(in_box_m.size());
   const bool solid = voxels * std::pow(resolution_m, 3) >= 0.7 * box.volume_m3();
   if (!solid && static_cast<double>(near_faces) < kNearFaces * voxels) return false;

@@ -53,9 +53,8 @@ MapObject make_object(const VoxelMap& map, std::span<const std::size_t> voxels, 
 void number(MapObjects& found) {
   std::vector<std::uint32_t> order(found.objects.size()), new_id(found.objects.size() + 1, 0);
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
-  std::ranges::stable_sort(order, [&](std::uint32_t a, std::uint32_t b) {
-    return found.objects[a].voxels > found.objects[b].voxels;
-  });
+  std::ranges::stable_sort(
+      order, [&](std::uint32_t a, std::uint32_t b) { return found.objects[a].voxels > found.objects[b].voxels; });
   std::vector<MapObject> sorted;
   for (const std::uint32_t old : order) {
     sorted.push_back(found.objects[old]);

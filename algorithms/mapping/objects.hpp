@@ -56,7 +56,8 @@ struct ObjectMove {
 
 /// The map after objects were moved by hand: where they stood becomes unknown, never free; where they stand now is
 /// occupied with their log-odds, and what else is inside their boxes unknown. The grid grows where it must.
-/// @return log-odds only; kUsage for an id that is not there, one moved twice, or a move that is not finite; kMapTooLarge
+/// @return log-odds only; kUsage for an id that is not there, one moved twice, or a move that is not finite;
+/// kMapTooLarge
 [[nodiscard]] Result<VoxelMap> move_objects(const VoxelMap& map, const MapObjects& objects,
                                             std::span<const ObjectMove> moves, std::size_t voxels_max);
 

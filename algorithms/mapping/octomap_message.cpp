@@ -71,14 +71,14 @@ void write_rest(const OctomapContent& content, Members& members, ByteSink sink) 
 
 void write_octomap_yaml(const OctomapContent& content, ByteSink sink) {
   const auto write = [&sink](const std::string& text) { sink(std::as_bytes(std::span(text))); };
-  write(fmt::format(
-      "# octomap_msgs/Octomap, written by firstlook: {}. To publish it:\n"
-      "#   rostopic pub -l -f FILE /octomap_{} octomap_msgs/Octomap\n"
-      "#   ros2 topic pub --yaml-file FILE /octomap_{} octomap_msgs/msg/Octomap\n"
-      "header:\n  frame_id: {}\nbinary: {}\nid: {}\nresolution: {}\ndata: [",
-      content.binary != nullptr ? "free and occupied" : "log-odds", content.binary != nullptr ? "binary" : "full",
-      content.binary != nullptr ? "binary" : "full", content.frame_id, content.binary != nullptr, kId,
-      content.map.geometry().resolution_m));
+  write(
+      fmt::format("# octomap_msgs/Octomap, written by firstlook: {}. To publish it:\n"
+                  "#   rostopic pub -l -f FILE /octomap_{} octomap_msgs/Octomap\n"
+                  "#   ros2 topic pub --yaml-file FILE /octomap_{} octomap_msgs/msg/Octomap\n"
+                  "header:\n  frame_id: {}\nbinary: {}\nid: {}\nresolution: {}\ndata: [",
+                  content.binary != nullptr ? "free and occupied" : "log-odds",
+                  content.binary != nullptr ? "binary" : "full", content.binary != nullptr ? "binary" : "full",
+                  content.frame_id, content.binary != nullptr, kId, content.map.geometry().resolution_m));
   bool first = true;
   const auto list = [&](std::span<const std::byte> piece) {
     std::string text;

@@ -18,7 +18,8 @@ struct OctomapContent {
 };
 
 /// YAML of the message, with a header of the frame alone so that ROS 1 and ROS 2 both take it (their stamps differ):
-/// `rostopic pub -l -f FILE TOPIC octomap_msgs/Octomap`, `ros2 topic pub --yaml-file FILE TOPIC octomap_msgs/msg/Octomap`.
+/// `rostopic pub -l -f FILE TOPIC octomap_msgs/Octomap`, `ros2 topic pub --yaml-file FILE TOPIC
+/// octomap_msgs/msg/Octomap`.
 void write_octomap_yaml(const OctomapContent& content, ByteSink sink);
 
 /// The message as ROS 1 serialises it (roscpp, rospy's Octomap.deserialize): little-endian, lengths before strings and

@@ -14,11 +14,11 @@ namespace firstlook {
 
 /// What a file holds.
 struct OctreeInfo {
-  std::string id;         ///< "OcTree", "OcTreeStamped" or "ColorOcTree"; colours are skipped
+  std::string id;             ///< "OcTree", "OcTreeStamped" or "ColorOcTree"; colours are skipped
   bool has_log_odds = false;  ///< `.ot`; a `.bt` has classes
   double resolution_m = 0;    ///< of a voxel, at the tree's lowest depth
   std::size_t nodes = 0;
-  std::uint64_t known_voxels = 0;  ///< at the lowest depth; leaves higher up hold many
+  std::uint64_t known_voxels = 0;                   ///< at the lowest depth; leaves higher up hold many
   Eigen::Vector3i first = Eigen::Vector3i::Zero();  ///< as GridGeometry: the smallest box of voxels around all leaves
   Eigen::Vector3i size = Eigen::Vector3i::Zero();   ///< 0 when the tree is empty
 

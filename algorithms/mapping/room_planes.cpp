@@ -9,17 +9,18 @@
 namespace firstlook {
 namespace {
 
-constexpr int kPlanesMax = 6;                // of a room
-constexpr int kTrials = 150;                 // voxels whose surroundings propose a plane
-constexpr std::size_t kSampleMax = 20000;    // voxels that a proposal is counted on
-constexpr double kThickness_m = 0.04;        // to either side, or one and a half voxels where that is more
+constexpr int kPlanesMax = 6;              // of a room
+constexpr int kTrials = 150;               // voxels whose surroundings propose a plane
+constexpr std::size_t kSampleMax = 20000;  // voxels that a proposal is counted on
+constexpr double kThickness_m = 0.04;      // to either side, or one and a half voxels where that is more
 constexpr double kAreaMin_m2 = 0.4;
-constexpr double kShareMin = 0.04;           // of all occupied voxels
-constexpr double kBeyondMax = 0.05;          // of the other voxels: on the far side
-constexpr double kFreeBeforeMin = 0.5;       // of the plane: free voxels before it, on the near side
-constexpr double kTouchingMax = 0.3;         // of a piece: voxels beside occupied ones off the plane
+constexpr double kShareMin = 0.04;      // of all occupied voxels
+constexpr double kBeyondMax = 0.05;     // of the other voxels: on the far side
+constexpr double kFreeBeforeMin = 0.5;  // of the plane: free voxels before it, on the near side
+constexpr double kTouchingMax = 0.3;    // of a piece: voxels beside occupied ones off the plane
+constexpr double kPieceMin = 0.1;       // of the plane's largest piece
 constexpr std::uint8_t kInSlab = 1, kInPiece = 2;
-constexpr int kNeighborhood = 3;             // voxels to each side
+constexpr int kNeighborhood = 3;  // voxels to each side
 
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -151,7 +152,8 @@ class RoomPlanes {
   /// The connected pieces of a slab that are surfaces, not slices through something that stands across it.
   std::vector<std::size_t> surfaces_of(const std::vector<std::size_t>& slab) {
     for (const std::size_t i : slab) slab_mark_[occupied_[i]] = kInSlab;
-    std::vector<std::size_t> kept;
+    std::vector<std::vector<std::size_t>> pieces;
+    std::size_t largest = 0;
     for (const std::size_t first : slab) {
       if (slab_mark_[occupied_[first]] != kInSlab) continue;
       std::vector<std::size_t> piece = {occupied_[first]};
@@ -168,10 +170,16 @@ class RoomPlanes {
         touching += touches;
       }
       if (static_cast<double>(touching) > kTouchingMax * static_cast<double>(piece.size())) continue;
+      largest = std::max(largest, piece.size());
+      pieces.push_back(std::move(piece));
+    }
+    for (const std::size_t i : slab) slab_mark_[occupied_[i]] = 0;
+    std::vector<std::size_t> kept;
+    for (const std::vector<std::size_t>& piece : pieces) {
+      if (static_cast<double>(piece.size()) < kPieceMin * static_cast<double>(largest)) continue;
       for (const std::size_t index : piece)
         kept.push_back(static_cast<std::size_t>(std::ranges::lower_bound(occupied_, index) - occupied_.begin()));
     }
-    for (const std::size_t i : slab) slab_mark_[occupied_[i]] = 0;
     std::ranges::sort(kept);
     return kept;
   }

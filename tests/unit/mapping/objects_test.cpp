@@ -15,7 +15,8 @@ using Eigen::Vector3i;
 
 constexpr double kResolution_m = 0.05;
 
-/// A scene of solids, seen from outside: their surface voxels are occupied, what is deeper inside unknown, all else free.
+/// A scene of solids, seen from outside: their surface voxels are occupied, what is deeper inside unknown, all else
+/// free.
 class Scene {
  public:
   explicit Scene(const Vector3i& size, double resolution_m = kResolution_m)
@@ -23,8 +24,9 @@ class Scene {
 
   /// A turned box.
   void add(const Vector3d& center_m, const Vector3d& size_m, double yaw_rad, double pitch_rad = 0) {
-    const OrientedBox box{center_m, size_m,
-                          Eigen::AngleAxisd(yaw_rad, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch_rad, Vector3d::UnitY())};
+    const OrientedBox box{
+        center_m, size_m,
+        Eigen::AngleAxisd(yaw_rad, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch_rad, Vector3d::UnitY())};
     OrientedBox core = box;
     core.size_m.array() -= 2.2 * geometry_.resolution_m;
     each([&](std::size_t index, const Vector3d& p) {
@@ -121,8 +123,8 @@ TEST_CASE("the floor and walls of a room do not join what stands on them", "[map
   scene.fill(outside, kUnknownLogOdds);
   scene.fill([](const Vector3d& p) { return std::abs(p.z() + 1.0) < 0.05 && p.x() < 2.0; }, kLogOddsMax);
   scene.fill([](const Vector3d& p) { return std::abs(p.x() - 2.0) < 0.05 && p.z() > -1.0; }, kLogOddsMax);
-  scene.add({0, 0, -0.75}, {0.6, 0.6, 0.5}, 0);       // a box on the floor
-  scene.add({1.7, -1, -0.6}, {0.6, 0.5, 0.9}, 0);     // a cabinet in the corner of floor and wall
+  scene.add({0, 0, -0.75}, {0.6, 0.6, 0.5}, 0);    // a box on the floor
+  scene.add({1.7, -1, -0.6}, {0.6, 0.5, 0.9}, 0);  // a cabinet in the corner of floor and wall
   const VoxelMap map = scene.map();
   const MapObjects found = find_objects(map, octomap_class);
   require_boxes_hold_their_voxels(found, map);

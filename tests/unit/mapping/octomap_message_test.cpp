@@ -78,7 +78,10 @@ std::string value_of(const std::string& yaml, const std::string& key) {
 }
 
 Message read_yaml(const std::string& yaml) {
-  Message m{value_of(yaml, "  frame_id"), value_of(yaml, "id"), {}, value_of(yaml, "binary") == "true",
+  Message m{value_of(yaml, "  frame_id"),
+            value_of(yaml, "id"),
+            {},
+            value_of(yaml, "binary") == "true",
             std::stod(value_of(yaml, "resolution"))};
   std::istringstream list(value_of(yaml, "data"));
   CHECK(list.get() == '[');

@@ -87,3 +87,38 @@ TEST_CASE("the frontier is unknown and touches free space", "[gain]") {
     REQUIRE(world.zone[i] == 1);
   }
 }
+
+TEST_CASE("an earlier map says where to look first, and nothing else", "[gain]") {
+  SmallWorld world(Truth::room());
+  VoxelMap prior(world.map.geometry(), VoxelMap::Planes::kLogOddsOnly);
+  for (std::size_t i = 0; i < prior.size(); ++i)
+    prior.set(i, world.truth.solid[i] != 0 ? VoxelClass::kOccupied : VoxelClass::kFree, 0);
+  GainModel model(world.map.geometry(), world.sensor);
+  model.allow_prior();
+  GainWorker worker = model.worker();
+  JointVector beside = world.q;
+  beside[0] += 0.1;
+  for (int look = 0; look < 2; ++look) {
+    INFO("after " << look << " looks");
+    model.prepare(world.context());
+    const ViewGain without = model.count(world.context(), beside, worker);
+    const std::vector<std::uint32_t> frontier(model.frontier().begin(), model.frontier().end());
+    ViewContext hinted = world.context();
+    hinted.prior = &prior;
+    model.prepare(hinted);
+    const ViewGain with = model.count(hinted, beside, worker);
+    REQUIRE(with.unknown == without.unknown);
+    REQUIRE(with.again == without.again);
+    REQUIRE(without.expected_surface == 0);
+    REQUIRE(std::equal(frontier.begin(), frontier.end(), model.frontier().begin(), model.frontier().end()));
+    if (look == 0) {
+      REQUIRE(with.expected_surface > 20);
+      REQUIRE(with.expected_surface < with.unknown);
+      REQUIRE(with.weight() == without.weight() + with.expected_surface);
+      world.look(beside);
+      world.update();
+    } else {
+      REQUIRE(with.expected_surface < 20);  // seen: nothing is expected there any more
+    }
+  }
+}
