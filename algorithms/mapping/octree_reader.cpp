@@ -86,7 +86,8 @@ Result<OctreeInfo> read_header(ByteReader& reader) {
     const std::string_view value = std::string_view(line).substr(std::min(space + 1, line.size()));
     if (key == "data") break;
     if (key == "id") info.id = value;
-    if (key == "size" && !(has_size = to_number(value, info.nodes)))
+    if (key == "size") has_size = to_number(value, info.nodes);
+    if (key == "size" && !has_size)
       return failure(Fault::kMapUnreadable, "byte {}: size '{}' is not a number of nodes", at, value);
     if (key == "res" &&
         !(to_number(value, info.resolution_m) && info.resolution_m > 0 && std::isfinite(info.resolution_m)))

@@ -65,12 +65,13 @@ Result<Found> find(const std::filesystem::path& run) {
   return found;
 }
 
-/// Files that appear in the folder one after the other; the first error stays.
+/// Files that appear one after the other in a folder that is made for the first; the first error stays.
 class Folder {
  public:
-  explicit Folder(std::string path) : path_(std::move(path)), status_(make_directories(path_)) {}
+  explicit Folder(std::string path) : path_(std::move(path)) {}
 
   void add(std::string_view name, FunctionRef<void(ByteSink)> write) {
+    if (status_ && files_.empty()) status_ = make_directories(path_);
     if (!status_) return;
     const std::string file = fmt::format("{}/{}", path_, name);
     status_ = write_streamed(file, write);
