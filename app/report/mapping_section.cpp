@@ -46,7 +46,7 @@ std::string objects_table(const MapObjects& objects) {
                grouped(o.voxels), fmt::format("{:.2f} x {:.2f} x {:.2f}", s.x(), s.y(), s.z()),
                fmt::format("{:.2f}, {:.2f}, {:.2f}", c.x(), c.y(), c.z())});
   }
-  return "<h3>Objects</h3>\n" + table.html() +
+  return "<h3>The objects in their boxes</h3>\n" + table.html() +
          fmt::format(
              "<p class=\"hint\">Connected occupied voxels in their boxes; {} more in pieces of fewer than {}."
              "</p>\n",
