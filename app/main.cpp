@@ -164,6 +164,7 @@ void narrate_alignment(const AlignmentRecord& alignment, Narrator& narrator) {
 void narrate_result(const RunRecord& record, Narrator& narrator) {
   narrator.clear_progress();
   narrator.line(fmt::format("{}: {}", name_of(record.outcome), record.reason));
+  if (!record.remedy.empty()) narrator.line("to do     " + record.remedy);
   if (record.hand_eye) {
     const Eigen::Vector3d t = 1000 * record.hand_eye->flange_T_camera.translation();
     const Eigen::Vector3d s = 1000 * record.hand_eye->sigma_translation_m;

@@ -103,6 +103,7 @@ std::string result_json(const RunRecord& record) {
   Json json;
   json["outcome"] = name_of(record.outcome);
   json["reason"] = record.reason;
+  json["remedy"] = record.remedy.empty() ? Json() : Json(record.remedy);
   json["seed"] = record.seed;
   json["cell"] = cell_name(record.cell);
   json["phases"] = phases_json(record);

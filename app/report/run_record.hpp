@@ -271,6 +271,7 @@ struct VerifiedCalibration {
 struct RunRecord {
   Outcome outcome = Outcome::kFaulted;
   std::string reason;  ///< one sentence; for `done`, too
+  std::string remedy;  ///< what to do about it; empty when nothing is to be done
   std::int64_t seed = 0;
   std::string cell;
   std::vector<PhaseRecord> phases;

@@ -304,6 +304,7 @@ RunRecord Cart::record() const {
   r.provenance.config_yaml = print_config(config_);
   r.wall = wall_record();
   r.reason = reason_text(r, ending_);
+  if (ending_.has_fault) r.remedy = fault_row(ending_.fault).remedy;
   return r;
 }
 
