@@ -55,8 +55,9 @@ bool read_numbers(std::string_view text, std::span<double> numbers) {
     const bool last = i + 1 == numbers.size();
     const std::size_t end = last ? text.size() : text.find(',');
     if (end == std::string_view::npos) return false;
-    const auto [stop, error] = std::from_chars(text.data(), text.data() + end, numbers[i]);
-    if (error != std::errc{} || stop != text.data() + end || !std::isfinite(numbers[i])) return false;
+    const std::string_view word = text.substr(0, end);
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), numbers[i]);
+    if (error != std::errc{} || stop != word.data() + word.size() || !std::isfinite(numbers[i])) return false;
     text.remove_prefix(std::min(text.size(), end + 1));
   }
   return true;
