@@ -77,6 +77,7 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
   set_board(cell.board, config.board);
+  config.calibration.touch_tip_m = {cell.flange_p_tip_m.x(), cell.flange_p_tip_m.y(), cell.flange_p_tip_m.z()};
   config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
@@ -175,6 +176,12 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
       const Verification& v = *record.verified->verification;
       narrator.line(fmt::format("verified  on {} views: chi-square {:.1f}, allowed {:.1f}; {:.2f} px, {:.2f} mm RMS",
                                 v.views.size(), v.chi2, v.chi2_limit, v.residual_rms_px, v.residual_rms_m * 1e3));
+    }
+    if (const auto& t = record.hand_eye->touch_test) {
+      narrator.line(fmt::format("touched   camera off by {:.2f} ± {:.2f} mm, {:.2f} ± {:.2f} mrad by {} of {} touches",
+                                t->mean.head<3>().norm() * 1e3, t->mean_sigma.head<3>().norm() * 1e3,
+                                t->mean.tail<3>().norm() * 1e3, t->mean_sigma.tail<3>().norm() * 1e3, t->board.used,
+                                t->board.fits.size()));
     }
     if (record.alignment && record.alignment->depth_camera.estimate) narrate_alignment(*record.alignment, narrator);
     for (const std::string& reason : record.hand_eye->reasons) narrator.line("rejected  " + reason);

@@ -93,7 +93,8 @@ void measure_errors(const CalibratedBoard& calibrated, std::span<const PosePair>
   }
   const Matrix6d j = mean_moved_by_board(calibrated, place_views);
   const Matrix6d covariance = j * (test.board.covariance + calibrated.covariance) * j.transpose();
-  test.mean_sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const CameraError of_views = test.view_deviation.cwiseAbs2() / test.places;
+  test.mean_sigma = (covariance.diagonal().cwiseMax(0) + of_views).cwiseSqrt();
 }
 
 /// A board as it lies when its frame is turned, with the covariance that this gives it.

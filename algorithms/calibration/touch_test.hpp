@@ -32,7 +32,7 @@ struct TouchTest {
   TouchedBoard board;
   std::vector<CameraError> errors;                     ///< one for each view given
   CameraError mean = CameraError::Zero();              ///< over the places of the arm
-  CameraError mean_sigma = CameraError::Zero();        ///< as expected of it: covariances of the touches and the board
+  CameraError mean_sigma = CameraError::Zero();        ///< as expected of it: touches, board, scatter of the views
   CameraError view_deviation = CameraError::Zero();    ///< standard deviation over the places; 0 below two of them
   CameraError static_deviation = CameraError::Zero();  ///< the same over repeated looks from one place, all such places
                                                        ///< together; 0 without

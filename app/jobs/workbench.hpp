@@ -51,6 +51,7 @@ struct Observation {
   double residual_rms_px = 0;
   SettlingRecord settling;
   std::optional<BoardPlane> plane;  ///< of the board in depth frames of this stop
+  std::vector<CornerSet> frames;    ///< that `view` is the mean of
 };
 
 /// What was seen of the board on the way between two stops.
@@ -66,6 +67,7 @@ struct WaySight {
 /// What the frames of one look show.
 struct BoardSight {
   std::optional<StandingPicture> picture;  ///< empty: no board to be used
+  std::vector<CornerSet> frames;           ///< those that show it
   bool still = true;
   double moved_px = 0;
 };
@@ -90,6 +92,7 @@ class Workbench {
   [[nodiscard]] CalibrationViewResult next_calibration_view(const FromHere& here);
   [[nodiscard]] SolveResult solve();
   [[nodiscard]] ValidateResult validate();
+  [[nodiscard]] TouchTestResult touch_test(const TouchTestArguments& arguments);
   [[nodiscard]] VerificationViewResult next_verification_view(const FromHere& here);
   [[nodiscard]] VerifyResult verify_calibration();
   [[nodiscard]] IntegrateResult integrate(const IntegrateArguments& arguments);
@@ -187,6 +190,9 @@ class Workbench {
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
+  [[nodiscard]] bool tests_by_touch() const { return config_.calibration.touch_test == "yes"; }
+  [[nodiscard]] TouchRecord touch_record(const TouchTestArguments& arguments) const;
+  [[nodiscard]] std::vector<PosePair> repeated_looks() const;
   [[nodiscard]] HandEyeClaim claim() const;
   [[nodiscard]] std::optional<Path> best_verification_view(const FromHere& here, const ViewDesignModel& model,
                                                            const Matrix12d& information);

@@ -49,7 +49,8 @@ struct CellDescription {
   double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
   BoardSpec board;
-  double cart_top_m = -0.02;  ///< z of the cart's own top
+  Eigen::Vector3d flange_p_tip_m = Eigen::Vector3d::Zero();  ///< as somebody measured it, 0.5 mm each axis
+  double cart_top_m = -0.02;                                 ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
 };

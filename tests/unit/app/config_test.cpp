@@ -64,6 +64,13 @@ Config all_changed() {
                    1.4,
                    0.02,
                    0.5,
+                   "yes",
+                   13,
+                   "given",
+                   {0.1, 0.2, 0.3},
+                   0.6,
+                   6,
+                   11,
                    "runs/first: one/hand_eye.yaml",
                    4};
   c.depth = {0.4, 6, 3.5, 0.003};
