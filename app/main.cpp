@@ -77,6 +77,7 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
   set_board(cell.board, config.board);
+  config.calibration.touch_tip_m = {cell.flange_p_tip_m.x(), cell.flange_p_tip_m.y(), cell.flange_p_tip_m.z()};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
         {{box.low_m.x(), box.low_m.y(), box.low_m.z()}, {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
@@ -167,6 +168,7 @@ void narrate_alignment(const AlignmentRecord& alignment, Narrator& narrator) {
 void narrate_result(const RunRecord& record, Narrator& narrator) {
   narrator.clear_progress();
   narrator.line(fmt::format("{}: {}", name_of(record.outcome), record.reason));
+  if (!record.remedy.empty()) narrator.line("to do     " + record.remedy);
   if (record.hand_eye) {
     const Eigen::Vector3d t = 1000 * record.hand_eye->flange_T_camera.translation();
     const Eigen::Vector3d s = 1000 * record.hand_eye->sigma_translation_m;
@@ -177,6 +179,12 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
       const Verification& v = *record.verified->verification;
       narrator.line(fmt::format("verified  on {} views: chi-square {:.1f}, allowed {:.1f}; {:.2f} px, {:.2f} mm RMS",
                                 v.views.size(), v.chi2, v.chi2_limit, v.residual_rms_px, v.residual_rms_m * 1e3));
+    }
+    if (const auto& t = record.hand_eye->touch_test) {
+      narrator.line(fmt::format("touched   camera off by {:.2f} ± {:.2f} mm, {:.2f} ± {:.2f} mrad by {} of {} touches",
+                                t->mean.head<3>().norm() * 1e3, t->mean_sigma.head<3>().norm() * 1e3,
+                                t->mean.tail<3>().norm() * 1e3, t->mean_sigma.tail<3>().norm() * 1e3, t->board.used,
+                                t->board.fits.size()));
     }
     if (record.alignment && record.alignment->depth_camera.estimate) narrate_alignment(*record.alignment, narrator);
     for (const std::string& reason : record.hand_eye->reasons) narrator.line("rejected  " + reason);
@@ -294,6 +302,7 @@ struct Dispatch {
   int operator()(const RunCommand& c) const { return run_job(c); }
   int operator()(const CalibrateCommandOptions& c) const { return run_calibrate_command(c); }
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
+  int operator()(const ExportCommandOptions& c) const { return run_export_command(c); }
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {

@@ -93,6 +93,13 @@ struct Config {
     double subset_spread_max_mm = 3.0;
     double gripper_tolerance_m = 0.01;
     double usable_distance_min_m = 0.3;
+    std::string touch_test = "no";  ///< yes: a person leads the arm's tip onto corners before the calibration counts
+    int touch_corners = 12;
+    std::string touch_tip = "estimate";            ///< given | estimate: from the touches
+    std::array<double, 3> touch_tip_m{0, 0, 0.2};  ///< of the flange
+    double touch_tip_sigma_mm = 0.5;
+    double touch_error_max_mm = 10;  ///< limits of the verdict: of the camera's place and rotation
+    double touch_error_max_mrad = 20;
     std::string stored = "none";  ///< hand_eye.yaml of an earlier run; none: no calibration is stored
     int verify_views = 3;         ///< views that a stored calibration is tested on at least
     bool operator==(const Calibration&) const = default;
@@ -124,6 +131,7 @@ struct Config {
     double fine_resolution_m = 0;     ///< of a finer map of a part of the cell; 0: there is none
     std::array<double, 3> fine_low_m{};
     std::array<double, 3> fine_high_m{};
+    std::string prior = "none";  ///< .bt or .ot of an earlier map of the cell; none: there is none
     bool operator==(const Map&) const = default;
   } map;
 

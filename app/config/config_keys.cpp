@@ -7,6 +7,7 @@
 #include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/config/board_config.hpp"
+#include "app/machine/job_types.hpp"
 #include "platform/loop/worker_pool.hpp"
 
 namespace firstlook {
@@ -198,6 +199,28 @@ void add_calibration_keys(Keys& keys, Config& c) {
                   10,
                   {},
                   "limit of the verdict: distance at which that tolerance must still hold"});
+  keys.push_back({"calibration.touch_test", &k.touch_test, 0, 0, kYesNo,
+                  "yes: before a calibration counts, a person leads the arm's tip by hand onto corners of the board"});
+  keys.push_back({"calibration.touch_corners",
+                  &k.touch_corners,
+                  3,
+                  static_cast<double>(kTouchPointsMax),
+                  {},
+                  "how many; the pendant names them"});
+  keys.push_back({"calibration.touch_tip", &k.touch_tip, 0, 0, kIntrinsics,
+                  "where the tip is on the flange. given: as touch_tip_m says; estimate: found from the touches, for "
+                  "which the arm is tilted to different sides between them"});
+  keys.push_back({"calibration.touch_tip_m", &k.touch_tip_m, -2, 2, {}, "the tip's offset in the flange, when given"});
+  keys.push_back(
+      {"calibration.touch_tip_sigma_mm", &k.touch_tip_sigma_mm, 0, 100, {}, "standard deviation of that, each axis"});
+  keys.push_back({"calibration.touch_error_max_mm",
+                  &k.touch_error_max_mm,
+                  0.01,
+                  100,
+                  {},
+                  "limit of the verdict: how far touches may put the camera from where the calibration does"});
+  keys.push_back(
+      {"calibration.touch_error_max_mrad", &k.touch_error_max_mrad, 0.01, 200, {}, "the same of its rotation"});
   keys.push_back({"calibration.stored",
                   &k.stored,
                   0,
@@ -278,6 +301,13 @@ void add_map_keys(Keys& keys, Config& c) {
                   "side of a voxel of a second, finer map of a part of the cell, fine_map.bt; 0: none"});
   keys.push_back({"map.fine_low_m", &c.map.fine_low_m, -10, 10, {}, "corner of that part in base"});
   keys.push_back({"map.fine_high_m", &c.map.fine_high_m, -10, 10, {}, "opposite corner"});
+  keys.push_back({"map.prior",
+                  &c.map.prior,
+                  0,
+                  0,
+                  {},
+                  "earlier map of the cell, .bt or .ot: hints where to look first, and nothing is known by it; none: "
+                  "there is none"});
   keys.push_back({"explore.views_max", &c.explore.views_max, 1, 500, {}, "views to take at most"});
   keys.push_back({"explore.candidates", &c.explore.candidates, 10, 20000, {}, "configurations scored for each view"});
   keys.push_back({"explore.certificate_samples",
@@ -375,6 +405,9 @@ std::string broken_rule(const Config& c) {
   }
   if (c.calibration.views_min > c.calibration.views_max) {
     return "calibration.views_min must not exceed calibration.views_max";
+  }
+  if (c.calibration.touch_tip == "estimate" && c.calibration.touch_corners < 4) {
+    return "calibration.touch_corners must be 4 at least when the tip is estimated";
   }
   if (const auto board = board_of(c.board); !board) return fmt::format("board: {}", board.error().detail());
   // Three views are the fewest that can determine a hand-eye transform (two motions about different axes).

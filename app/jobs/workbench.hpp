@@ -15,6 +15,7 @@
 #include "algorithms/mapping/distance_field.hpp"
 #include "algorithms/mapping/frame_gate.hpp"
 #include "algorithms/mapping/insertion.hpp"
+#include "algorithms/mapping/map_change.hpp"
 #include "algorithms/mapping/open_rays.hpp"
 #include "algorithms/motion/body.hpp"
 #include "algorithms/motion/clearance.hpp"
@@ -53,6 +54,7 @@ struct Observation {
   double residual_rms_px = 0;
   SettlingRecord settling;
   std::optional<BoardPlane> plane;  ///< of the board in depth frames of this stop
+  std::vector<CornerSet> frames;    ///< that `view` is the mean of
 };
 
 /// What was seen of the board on the way between two stops.
@@ -68,6 +70,7 @@ struct WaySight {
 /// What the frames of one look show.
 struct BoardSight {
   std::optional<StandingPicture> picture;  ///< empty: no board to be used
+  std::vector<CornerSet> frames;           ///< those that show it
   bool still = true;
   double moved_px = 0;
 };
@@ -92,6 +95,7 @@ class Workbench {
   [[nodiscard]] CalibrationViewResult next_calibration_view(const FromHere& here);
   [[nodiscard]] SolveResult solve();
   [[nodiscard]] ValidateResult validate();
+  [[nodiscard]] TouchTestResult touch_test(const TouchTestArguments& arguments);
   [[nodiscard]] VerificationViewResult next_verification_view(const FromHere& here);
   [[nodiscard]] VerifyResult verify_calibration();
   [[nodiscard]] IntegrateResult integrate(const IntegrateArguments& arguments);
@@ -122,6 +126,8 @@ class Workbench {
   /// The classes of the map as the sweep left it; all unknown when the sweep did not end.
   [[nodiscard]] VoxelMap map_after_sweep() const;
   [[nodiscard]] std::span<const std::uint8_t> zone() const { return zone_; }
+  /// What became of the prior map in the reach zone; empty without one.
+  [[nodiscard]] std::optional<MapChange> change_since_prior() const;
   [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
   [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
   [[nodiscard]] const FlawCounts& frames_refused() const { return frames_refused_; }
@@ -156,6 +162,7 @@ class Workbench {
   };
   [[nodiscard]] std::array<Pace, 3> mapping_paces() const;
   void revoke_zone();
+  void take_prior(VoxelMap prior);
   void note_trail(const Path& path);
   [[nodiscard]] Route route_of(const Path& path, const Body& body, const SpeedLimits& limits) const;
   [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
@@ -193,6 +200,9 @@ class Workbench {
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
+  [[nodiscard]] bool tests_by_touch() const { return config_.calibration.touch_test == "yes"; }
+  [[nodiscard]] TouchRecord touch_record(const TouchTestArguments& arguments) const;
+  [[nodiscard]] std::vector<PosePair> repeated_looks() const;
   [[nodiscard]] HandEyeClaim claim() const;
   [[nodiscard]] std::optional<Path> best_verification_view(const FromHere& here, const ViewDesignModel& model,
                                                            const Matrix12d& information);
@@ -258,6 +268,7 @@ class Workbench {
   bool any_revoked_ = false;
   FreeSpace mapping_space_;  ///< as rebuilt last
   ViewChooser chooser_;
+  std::optional<VoxelMap> prior_;  ///< a hint for views; never for motion
   FixedVector<JointVector, 512> trail_;
   std::optional<SweepProgress> sweep_;
   std::vector<std::int8_t> swept_log_odds_;  ///< when the sweep ended

@@ -191,6 +191,20 @@ std::optional<PosedFrame> Machine::posed(const hal::Frame& frame) const {
   return std::nullopt;
 }
 
+std::optional<JointVector> Machine::stood_at(double for_s) const {
+  constexpr double kStill_rad = 3e-4;  // 15 sigmas of an encoder; a hand that holds the arm moves it by more
+  JointVector sum = JointVector::zero(arm_.position_rad.size());
+  int count = 0;
+  for (std::size_t i = history_size_; i-- > 0;) {
+    const hal::ArmState& state = history_[i];
+    if ((state.position_rad - arm_.position_rad).max_abs() > kStill_rad) return std::nullopt;
+    sum = sum + state.position_rad;
+    ++count;
+    if (now_ - state.stamp >= seconds(for_s)) return sum * (1.0 / count);
+  }
+  return std::nullopt;
+}
+
 /// The oldest of the frames whose stamps the arm has reached, when its joints there are known.
 template <typename Frames>
 std::optional<PosedFrame> Machine::next_posed(Frames& pending, std::uint64_t& unposed) {

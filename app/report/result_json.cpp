@@ -4,6 +4,7 @@
 
 #include "app/report/alignment_json.hpp"
 #include "app/report/hand_eye_json.hpp"
+#include "app/report/map_json.hpp"
 #include "app/report/ros_files.hpp"
 #include "app/report/settling.hpp"
 
@@ -23,10 +24,6 @@ Json phases_json(const RunRecord& record) {
     phases.push_back({{"name", phase.name}, {"start_s", phase.start_s}, {"end_s", phase.end_s}});
   }
   return phases;
-}
-
-Json counts_json(const VoxelCounts& counts) {
-  return {{"unknown", counts.unknown}, {"free", counts.free}, {"occupied", counts.occupied}};
 }
 
 Json mapping_json(const MappingRecord& mapping) {
@@ -58,7 +55,9 @@ Json mapping_json(const MappingRecord& mapping) {
             {"pixels_open", mapping.holes.pixels_open},
             {"voxels_cleared", mapping.holes.voxels_cleared}}},
           {"occupied_forgotten", mapping.occupied_forgotten},
-          {"remaining", remaining}};
+          {"remaining", remaining},
+          {"prior", mapping.since_prior ? change_json(*mapping.since_prior) : Json(nullptr)},
+          {"objects", objects_json(mapping.objects)}};
 }
 
 Json safety_json(const SafetyRecord& safety) {
@@ -122,6 +121,7 @@ std::string result_json(const RunRecord& record) {
   Json json;
   json["outcome"] = name_of(record.outcome);
   json["reason"] = record.reason;
+  json["remedy"] = record.remedy.empty() ? Json() : Json(record.remedy);
   json["seed"] = record.seed;
   json["cell"] = cell_name(record.cell);
   json["phases"] = phases_json(record);

@@ -16,6 +16,8 @@
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/verification.hpp"
 #include "algorithms/mapping/frame_gate.hpp"
+#include "algorithms/mapping/map_change.hpp"
+#include "algorithms/mapping/objects.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 #include "algorithms/motion/clearance.hpp"
 #include "app/dataset/hand_eye_file.hpp"
@@ -146,6 +148,8 @@ struct MappingRecord {
   VoxelCounts grid_voxels;  ///< of the whole grid: what the map files hold
   std::optional<FineMapRecord> fine;
   std::vector<RemainingRecord> remaining;
+  std::optional<MapChange> since_prior;  ///< in the reach zone; empty when no earlier map was given
+  MapObjects objects;                    ///< of the whole grid, as collision_map.bt has it; without the voxels' ids
   std::uint64_t frames_integrated = 0;
   FlawCounts frames_refused{};        ///< by FrameFlaw
   std::uint64_t infinite_pixels = 0;  ///< of the largest value: taken for no return
@@ -291,6 +295,7 @@ struct VerifiedCalibration {
 struct RunRecord {
   Outcome outcome = Outcome::kFaulted;
   std::string reason;  ///< one sentence; for `done`, too
+  std::string remedy;  ///< what to do about it; empty when nothing is to be done
   std::int64_t seed = 0;
   std::string cell;
   std::vector<PhaseRecord> phases;

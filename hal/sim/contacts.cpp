@@ -63,6 +63,12 @@ bool ContactMonitor::body_moved(Instant, const JointVector& from_rad, const Join
   return in_contact_;
 }
 
+void ContactMonitor::body_led() {
+  last_.clear();
+  in_contact_ = outside_ = false;
+  check_number_ += 2;  // what the body overlapped is not what it overlaps
+}
+
 void ContactMonitor::check(const Capsules& placed) {
   ++checks_;
   check_contact(placed);

@@ -35,6 +35,10 @@ class ContactMonitor final : public BodyWatcher {
   /// See Grader::watch. Allocates.
   void watch(const KnownFreeView* view);
   bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) override;
+  /// Nothing is counted while a person leads the arm by hand: the touch test brings its tip to the board on purpose,
+  /// and it is that person who moves it. From the first motion of the program's own on everything counts anew, so that
+  /// an arm that moves off from where it is in contact, or outside of what is known free, is found.
+  void body_led() override;
 
   [[nodiscard]] std::uint64_t contacts() const { return contacts_; }
   [[nodiscard]] std::uint64_t unknown_entries() const { return unknown_entries_; }

@@ -101,7 +101,8 @@ struct Scene {
   std::size_t board_solid = 0;  ///< which of them is the board's panel
   BoardPlacement board;
   CameraMount mount;
-  SafeZone safe_zone;  ///< its floor is the cart's top
+  Eigen::Vector3d flange_p_tip_m{0.012, -0.008, 0.3};  ///< of the probe that a person touches the board with; no body
+  SafeZone safe_zone;                                  ///< its floor is the cart's top
   std::vector<Region> regions;
   std::vector<Region> keep_out;
   Light light;

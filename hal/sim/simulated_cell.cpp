@@ -27,6 +27,7 @@ class MonitorInTime final : public BodyWatcher {
     monitor_.set_world(scenes_.at(stamp).world);
     return monitor_.body_moved(stamp, from_rad, to_rad);
   }
+  void body_led() override { monitor_.body_led(); }
 
  private:
   ContactMonitor& monitor_;
@@ -75,7 +76,15 @@ Transform<Camera, Depth> stated_mount(const Transform<Camera, Depth>& mount, con
   return {Eigen::Quaterniond(turn) * mount.quaternion(), mount.translation() + shift};
 }
 
-CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail) {
+/// Where somebody measured the tip to be.
+Eigen::Vector3d measured_tip(const Scene& scene, std::uint64_t seed) {
+  constexpr double kMeasured_m = 5e-4;
+  Random random(seed, kTipStream);
+  return scene.flange_p_tip_m + kMeasured_m * random.normal3();
+}
+
+CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail,
+                              std::uint64_t seed) {
   CellDescription d;
   d.name = scene.name;
   d.arm_model = scene.arm_model;
@@ -84,6 +93,7 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
   d.depth = renderer.depth_intrinsics(detail);
   d.camera_T_depth = stated_mount(scene.mount.camera_T_depth, faults);
   d.board = scene.board.spec;
+  d.flange_p_tip_m = measured_tip(scene, seed);
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;
   for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});
@@ -126,14 +136,15 @@ class Cell final : public SimulatedCell {
       : scenes_(loaded, sensor, faults),
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
-        description_(describe_cell(scene_, first_.renderer, faults, detail(options))),
+        description_(describe_cell(scene_, first_.renderer, faults, detail(options), options.seed)),
         grader_(truth_of(scene_, model, first_, faults, options)),
         watcher_(grader_.monitor(), scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
         rig_(model, scene_.mount, arm_),
         color_(color_timing(faults, options.seed), arm_, rig_, scenes_, description_.color, options.fast_sensor),
         depth_(depth_timing(faults, options.seed), arm_, rig_, scenes_, detail(options)),
-        pendant_(pendant_script(faults)),
+        hand_(scene_, model, faults, options.seed, arm_),
+        pendant_(pendant_script(faults), &hand_),
         panel_(panel_script(faults)) {}
 
   [[nodiscard]] const CellDescription& description() const override { return description_; }
@@ -159,6 +170,7 @@ class Cell final : public SimulatedCell {
   CameraRig rig_;
   SimulatedColorCamera color_;
   SimulatedDepthCamera depth_;
+  TouchingHand hand_;
   SimulatedPendant pendant_;
   SimulatedPanel panel_;
 };

@@ -46,7 +46,8 @@ struct CellDescription {
   double depth_units_per_m = 1000;
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
   BoardSpec board;
-  double cart_top_m = -0.02;  ///< z of the cart's own top
+  Eigen::Vector3d flange_p_tip_m = Eigen::Vector3d::Zero();  ///< as somebody measured it, 0.5 mm each axis
+  double cart_top_m = -0.02;                                 ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
 };

@@ -194,3 +194,29 @@ TEST_CASE("the camera's housing lies inside what the program takes for it", "[si
     }));
   }
 }
+
+TEST_CASE("what a person leads the arm into is not the program's doing; moving off from there is", "[sim][contacts]") {
+  BoxWorld world;
+  const Eigen::Vector3d post = camera_at(stretched(0.8));
+  world.boxes.push_back({post - Eigen::Vector3d(0.005, 0.005, 0.03), post + Eigen::Vector3d(0.005, 0.005, 0.03)});
+  TestView view;
+  for (std::size_t i = 0; i < view.free.size(); ++i) {
+    if ((view.grid.center_m(view.grid.voxel_at(i)) - post).norm() < 0.1) view.free[i] = 0;
+  }
+  ContactMonitor monitor = monitor_in(world);
+  monitor.watch(&view);
+  CHECK_FALSE(monitor.body_moved(Instant{}, stretched(0), stretched(0.01)));
+  REQUIRE(monitor.unknown_entries() == 0);
+  for (int i = 0; i < 10; ++i) monitor.body_led();  // into the post, and there it stays
+  CHECK(monitor.contacts() == 0);
+  SECTION("brought back") {
+    CHECK_FALSE(monitor.body_moved(Instant{}, stretched(0), stretched(0.01)));
+    CHECK(monitor.contacts() == 0);
+    CHECK(monitor.unknown_entries() == 0);
+  }
+  SECTION("left there: the first motion of the program's own counts") {
+    CHECK(monitor.body_moved(Instant{}, stretched(0.8), stretched(0.801)));
+    CHECK(monitor.contacts() == 1);
+    CHECK(monitor.unknown_entries() > 0);
+  }
+}
