@@ -180,11 +180,11 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
       narrator.line(fmt::format("verified  on {} views: chi-square {:.1f}, allowed {:.1f}; {:.2f} px, {:.2f} mm RMS",
                                 v.views.size(), v.chi2, v.chi2_limit, v.residual_rms_px, v.residual_rms_m * 1e3));
     }
-    if (const auto& t = record.hand_eye->touch_test) {
+    if (const auto& touched = record.hand_eye->touch_test) {
       narrator.line(fmt::format("touched   camera off by {:.2f} ± {:.2f} mm, {:.2f} ± {:.2f} mrad by {} of {} touches",
-                                t->mean.head<3>().norm() * 1e3, t->mean_sigma.head<3>().norm() * 1e3,
-                                t->mean.tail<3>().norm() * 1e3, t->mean_sigma.tail<3>().norm() * 1e3, t->board.used,
-                                t->board.fits.size()));
+                                touched->mean.head<3>().norm() * 1e3, touched->mean_sigma.head<3>().norm() * 1e3,
+                                touched->mean.tail<3>().norm() * 1e3, touched->mean_sigma.tail<3>().norm() * 1e3,
+                                touched->board.used, touched->board.fits.size()));
     }
     if (record.alignment && record.alignment->depth_camera.estimate) narrate_alignment(*record.alignment, narrator);
     for (const std::string& reason : record.hand_eye->reasons) narrator.line("rejected  " + reason);

@@ -80,7 +80,7 @@ TEST_CASE("an arm left at the board is not moved: the job ends safely, and the c
   CHECK_FALSE(std::filesystem::exists(folder / "out/ros"));
 }
 
-TEST_CASE("a pause, a stop and a protective stop while somebody leads the arm", "[scenario]") {
+TEST_CASE("a stop and a protective stop while somebody leads the arm", "[scenario]") {
   const JobFolder folder;
   const ProgramResult whole = calibrate_by_touch(folder, "whole", "given");
   REQUIRE(whole.exit_code == 0);
@@ -104,3 +104,5 @@ TEST_CASE("a pause, a stop and a protective stop while somebody leads the arm", 
   }
   check_safe(folder.read_json("out/result.json"));
 }
+
+}  // namespace firstlook
