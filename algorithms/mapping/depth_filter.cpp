@@ -20,7 +20,7 @@ std::size_t words(const GridGeometry& cubes) { return (cubes.count() + 63) / 64;
 
 DepthFilter::DepthFilter(const GridGeometry& map, const DepthSensor& sensor, const DepthFilterOptions& options)
     : options_(options), rays_(sensor), cubes_(cubes_over(map, options.voxel_m)), taken_(words(cubes_)) {
-  ENSURE(3095, options.crop_m >= 0 && options.voxel_m >= 0);
+  ENSURE(3120, options.crop_m >= 0 && options.voxel_m >= 0);
 }
 
 std::size_t DepthFilter::required_bytes(const GridGeometry& map, const DepthSensor& sensor,

@@ -46,7 +46,7 @@ std::size_t OpenRays::required_bytes(const GridGeometry& geometry, const DepthSe
 }
 
 void OpenRays::look(const DepthImage& depth, std::span<const float> self_depth_m) {
-  ENSURE(3081, depth.pixels.size() == shows_.size());
+  ENSURE(3121, depth.pixels.size() == shows_.size());
   look_at_pixels(depth, self_depth_m);
   look_around();
   look_for_shade(depth, self_depth_m);
@@ -54,7 +54,7 @@ void OpenRays::look(const DepthImage& depth, std::span<const float> self_depth_m
 
 OpenRaysResult OpenRays::clear(VoxelMap& map, const Transform<Base, Depth>& base_T_depth, const FrameMarks& marks,
                                double stamp_s, double free_max_age_s) {
-  ENSURE(3082, map.geometry() == geometry_);
+  ENSURE(3122, map.geometry() == geometry_);
   std::ranges::fill(passed_, 0);
   std::ranges::fill(suspect_, 0);
   const Frame frame{map, base_T_depth, stamp_s, free_max_age_s};

@@ -18,7 +18,7 @@ constexpr double kKeysMax = 32768;  // OctoMap's keys reach this far from zero
 
 SweepUpdate::SweepUpdate(const GridGeometry& geometry, const ScannerLimits& limits)
     : geometry_(geometry), limits_(limits) {
-  ENSURE(3091, limits.range_min_m >= 0 && limits.range_trusted_m > limits.range_min_m);
+  ENSURE(3123, limits.range_min_m >= 0 && limits.range_trusted_m > limits.range_min_m);
   missed_.resize(VoxelMap::bit_words(geometry));
   hit_.resize(missed_.size());
   crossed_.resize(geometry.count());

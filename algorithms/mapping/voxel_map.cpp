@@ -167,7 +167,7 @@ FrameChange VoxelMap::apply(std::span<const std::uint64_t> missed, std::span<con
 
 FrameChange VoxelMap::apply_open(std::span<std::uint64_t> passed, const Transform<Base, Depth>& base_T_depth,
                                  double stamp_s) {
-  ENSURE(3006, passed.size() == bit_words(geometry_) && !first_open_pose_.empty());
+  ENSURE(3008, passed.size() == bit_words(geometry_) && !first_open_pose_.empty());
   const Frame frame = begin_frame(base_T_depth, stamp_s);
   FrameChange change;
   const auto is_confirmed = [&](std::size_t index) {

@@ -51,7 +51,10 @@ class ContactMonitor final : public BodyWatcher {
   void check_voxels(const Capsules& placed);
   /// One voxel that the body overlaps now.
   void occupy(const Capsule& placed, const Eigen::Vector3i& voxel, bool& outside_grid);
-  [[nodiscard]] bool in_zone(const Capsule& placed, const Eigen::Vector3i& voxel) const;
+  struct Excuse {
+    bool in_zone = false, in_allowed_link = false;
+  };
+  [[nodiscard]] Excuse excuse(const Capsule& placed, const Eigen::Vector3i& voxel) const;
   [[nodiscard]] bool exempt(const Capsule& placed) const;
 
   const ArmModel arm_;
@@ -61,7 +64,8 @@ class ContactMonitor final : public BodyWatcher {
   const TrueWorld* world_;
   const KnownFreeView* view_ = nullptr;
 
-  Capsules last_;  ///< where the body was at the last check; empty before the first
+  Capsules last_;     ///< where the body was at the last check; empty before the first
+  Capsules allowed_;  ///< links that the base allowance excuses, as placed in this check
   std::vector<std::uint32_t>
       overlapped_;  ///< for each voxel the number of the last check in which the body overlapped it
   std::uint32_t check_number_ = 1;
