@@ -82,6 +82,15 @@ void GainModel::prepare(const ViewContext& context) {
     }
   }
   find_frontier(context);
+  if (context.prior != nullptr) prepare_prior(context);
+}
+
+void GainModel::prepare_prior(const ViewContext& context) {
+  ENSURE(4513, prior_plane_.size() == geometry_.count() && context.prior->geometry() == geometry_);
+  for (std::size_t i = 0; i < plane_.size(); ++i) {
+    const bool expected = plane_[i] == kUnknownWeight && context.prior->voxel_class(i) == VoxelClass::kOccupied;
+    prior_plane_[i] = plane_[i] == kOpaque ? kOpaque : expected ? std::uint8_t{1} : kPass;
+  }
 }
 
 void GainModel::find_frontier(const ViewContext& context) {
@@ -127,7 +136,13 @@ ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, 
   const GainCount counted = count_unknown(geometry_, plane_, rays, base_T_depth, sensor_.range_min_m,
                                           UnknownReading::kSeeThrough, worker.scratch);
   const auto unknown = static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
-  return {.unknown = unknown, .again = counted.voxels - unknown};
+  ViewGain gain{.unknown = unknown, .again = counted.voxels - unknown};
+  if (context.prior != nullptr) {
+    gain.expected_surface = count_unknown(geometry_, prior_plane_, rays, base_T_depth, sensor_.range_min_m,
+                                          UnknownReading::kSeeThrough, worker.scratch)
+                                .voxels;
+  }
+  return gain;
 }
 
 std::size_t GainModel::remember_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) {

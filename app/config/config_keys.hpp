@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "algorithms/mapping/sensor_presets.hpp"
 #include "app/config/config.hpp"
 
 namespace firstlook {
@@ -29,6 +30,9 @@ struct ConfigKey {
 
 /// The keys of one board, as they follow "board." or stand in an item of `boards`.
 [[nodiscard]] std::vector<ConfigKey> board_keys(Config::Board& board);
+
+/// The figures of a sensor, in place of all that `depth` holds.
+void set_sensor(const SensorPreset& preset, Config::Depth& depth);
 
 /// What single ranges cannot say: the first rule between keys that `config` breaks, in words; empty when all hold.
 [[nodiscard]] std::string broken_rule(const Config& config);

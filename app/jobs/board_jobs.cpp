@@ -15,7 +15,10 @@ namespace {
 
 ViewList list_of(const Result<Turns>& turns) {
   ViewList list;
-  if (!turns) return list;
+  if (!turns) {
+    list.fault = turns.error().fault;
+    return list;
+  }
   for (const JointVector& q : *turns) {
     if (!list.views_rad.full()) list.views_rad.push_back(q);
   }
@@ -79,7 +82,7 @@ BoardSight Workbench::sight_of(const DetectArguments& arguments) {
     if (auto picture = judge_standing(found[k])) {
       sight.still = sight.still && picture->still;
       sight.moved_px = std::max(sight.moved_px, picture->moved_px);
-      sight.targets.push_back({static_cast<int>(k), std::move(*picture)});
+      sight.targets.push_back({static_cast<int>(k), std::move(*picture), std::move(found[k])});
     } else {
       sight.still = false;
       sight.moved_px = std::max(sight.moved_px, kFramesAgree_px);  // at least: average_corners found no two alike
@@ -127,6 +130,7 @@ void Workbench::observe(std::size_t stop, const DetectArguments& arguments, cons
   o.residual_rms_px = pose.residual_rms_px;
   o.settling = {static_cast<int>(arguments.looks), sight.moved_px, seen.picture.scatter_px, sight.still};
   o.plane = plane_beside(arguments, seen.target, pose);
+  o.frames = seen.frames;
   observations_.push_back(std::move(o));
 }
 

@@ -11,7 +11,18 @@
 namespace firstlook::sim {
 namespace {
 
-enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kMount, kSwitch, kNumber, kInterval };
+enum class Kind : unsigned char {
+  kShare,
+  kTime,
+  kOffset,
+  kRelative,
+  kPixels,
+  kMount,
+  kSwitch,
+  kInterval,
+  kNumber,
+  kBoard
+};
 
 struct Knob {
   std::string_view name;
@@ -41,10 +52,12 @@ constexpr std::array kKnobs = {
     Knob{"operator.pause_at", Kind::kInterval, &Faults::pause_s},
     Knob{"operator.stop_at", Kind::kTime, &Faults::stop_s},
     Knob{"board.move_at", Kind::kTime, &Faults::board_move_s},
-    Knob{"board.number", Kind::kNumber, &Faults::board_number},
+    Knob{"board.number", Kind::kBoard, &Faults::board_number},
     Knob{"board.absent", Kind::kSwitch, nullptr, &Faults::board_absent},
     Knob{"camera.fixed", Kind::kSwitch, nullptr, &Faults::camera_fixed},
     Knob{"obstacle.appear_at", Kind::kTime, &Faults::obstacle_s},
+    Knob{"touch.mixed_up", Kind::kNumber, &Faults::touch_mixed_up},
+    Knob{"touch.left_there", Kind::kSwitch, nullptr, &Faults::touch_left_there},
 };
 
 /// Levenshtein 1966: insertions, deletions and substitutions between two names.
@@ -94,10 +107,13 @@ bool set_knob(const Knob& knob, std::string_view text, Faults& faults) {
     case Kind::kPixels:
       if (!read_number(text, number) || std::abs(number) > 100) return false;
       break;
+    case Kind::kNumber:
+      if (!read_number(text, number) || number < 0 || number > 100 || number != std::floor(number)) return false;
+      break;
     case Kind::kMount:
       if (!read_number(text, number) || std::abs(number) > 50) return false;
       break;
-    case Kind::kNumber:
+    case Kind::kBoard:
       if (!read_number(text, number) || number < 1 || number > kTargetsMax || number != std::floor(number))
         return false;
       break;

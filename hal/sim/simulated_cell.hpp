@@ -29,6 +29,7 @@ struct SimulationOptions {
   /// What the job looks for: each hangs in place of the cell's board of its name, one without a name in place of the
   /// only one. Empty: the cell's own boards. The colour camera counts them in this order.
   std::vector<NamedTarget> boards{};
+  std::string sensor = "kinect";  ///< sensor_presets.hpp
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.
@@ -45,13 +46,10 @@ struct CellDescription {
   CameraIntrinsics color;  ///< of the factory sheet
   CameraIntrinsics depth;
   double depth_units_per_m = 1000;
-  double depth_range_min_m = 0.5;
-  double depth_range_max_m = 5.0;
-  double depth_range_trusted_m = 3.0;
-  double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
-  Transform<Camera, Depth> camera_T_depth;  ///< factory transform
-  std::vector<NamedTarget> boards;          ///< those that the job looks for
-  double cart_top_m = -0.02;                ///< z of the cart's own top
+  Transform<Camera, Depth> camera_T_depth;                   ///< factory transform
+  std::vector<NamedTarget> boards;                           ///< those that the job looks for
+  Eigen::Vector3d flange_p_tip_m = Eigen::Vector3d::Zero();  ///< as somebody measured it, 0.5 mm each axis
+  double cart_top_m = -0.02;                                 ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
 };

@@ -2,6 +2,12 @@
 #include "app/machine/states/states.hpp"
 
 namespace firstlook::states {
+namespace {
+
+/// Nobody needs to touch a board that the calibration does not rest on. The first board is the one to touch.
+bool shows_touched_board(Machine& m) { return (m.progress().relevant & 1U) != 0; }
+
+}  // namespace
 
 void enter_validate(Machine& m) {
   m.show("validating the calibration");
@@ -12,6 +18,12 @@ Handled on_validate(Machine& m, const MachineEvent& event) {
   if (const auto result = m.result_of<ValidateResult>(JobKind::kValidate, event)) {
     if (!result->accepted) {
       m.conclude(Outcome::kCalibrationRejected, Fault::kCalibrationRejected);
+    } else if (!m.settings().touch_points.empty()) {
+      if (shows_touched_board(m)) {
+        m.transition(StateId::kTouchTest);
+      } else {
+        m.conclude(Outcome::kCalibrationRejected, Fault::kTouchesUnusable);
+      }
     } else if (m.settings().scope == RunScope::kCalibrate) {
       m.conclude(Outcome::kDone, std::nullopt);
     } else {

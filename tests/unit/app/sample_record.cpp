@@ -109,8 +109,28 @@ MappingRecord mapping() {
   m.remaining = {{1850, "occluded", {0.9, 0.3, 0.2}},
                  {640, "out_of_range", {-0.2, 0.1, -0.1}},
                  {210, "occluded", {0.7, -0.6, 0.5}}};
+  m.since_prior = MapChange{.still_occupied = 3900,
+                            .newly_occupied = 120,
+                            .gone = 75,
+                            .still_free = 30000,
+                            .unseen_occupied = 17,
+                            .unseen_free = 230,
+                            .first_known = 900};
+  m.objects.objects = {
+      {.id = 1,
+       .shape = ObjectShape::kPlane,
+       .bounds_room = true,
+       .voxels = 1200,
+       .box = {{0.9, 0, -0.2}, {1.2, 0.8, 0.1}, Eigen::Quaterniond::Identity()}},
+      {.id = 2,
+       .shape = ObjectShape::kBox,
+       .bounds_room = false,
+       .voxels = 340,
+       .box = {{0.9, 0.1, 0}, {0.4, 0.3, 0.3}, Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()))}}};
+  m.objects.specks = 21;
   m.frames_integrated = 412;
-  m.frames_dropped = 3;
+  m.frames_refused[static_cast<std::size_t>(FrameFlaw::kPoseUnknown)] = 2;
+  m.frames_refused[static_cast<std::size_t>(FrameFlaw::kPoseUncertain)] = 1;
   return m;
 }
 
@@ -203,7 +223,8 @@ RunRecord make_record() {
   r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
             "runs/20260131-7",      2};
   r.alignment = alignment();
-  r.truth = TruthRecord{0.21, 0.34, 4.7, 0.3, 0.4, 1e-5, -3e-4, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
+  r.truth =
+      TruthRecord{0.21, 0.34, 4.7, 0.3, 0.4, 1e-5, -3e-4, 0, 0, 0.972, 41, 0.003, {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }
 
