@@ -28,6 +28,12 @@ Ring ring_of(const ArmModel& arm, const Capsule& capsule) {
           .high_m = std::max(a.z(), b.z()) + capsule.radius_m};
 }
 
+void widen(BaseAllowance& allowance, const Ring& ring) {
+  allowance.radius_m = std::max(allowance.radius_m, ring.radius_m);
+  allowance.z_low_m = std::min(allowance.z_low_m, ring.low_m);
+  allowance.z_high_m = std::max(allowance.z_high_m, ring.high_m);
+}
+
 /// Appends a capsule with what is derived from it, but no self pairs.
 void append(Body& body, const ArmModel& arm, const Capsule& capsule) {
   bool exempt = false;
@@ -47,10 +53,7 @@ BaseAllowance base_allowance(const ArmModel& arm) {
   BaseAllowance allowance;
   for (const Capsule& capsule : arm.body) {
     if (capsule.link > 1) continue;
-    const Ring ring = ring_of(arm, capsule);
-    allowance.radius_m = std::max(allowance.radius_m, ring.radius_m);
-    allowance.z_low_m = std::min(allowance.z_low_m, ring.low_m);
-    allowance.z_high_m = std::max(allowance.z_high_m, ring.high_m);
+    widen(allowance, ring_of(arm, capsule));
   }
   return allowance;
 }
@@ -81,6 +84,13 @@ void add_envelope(Body& body, const ArmModel& arm, double radius_m, int link) {
 Body body_with_envelope(const ArmModel& arm, double radius_m, int link) {
   Body body = bare_body(arm);
   add_envelope(body, arm, radius_m, link < 0 ? arm.joints : link);
+  return body;
+}
+
+Body body_with_envelopes(const ArmModel& arm, double radius_m) {
+  Body body = bare_body(arm);
+  widen(body.allowance, ring_of(arm, {.radius_m = radius_m, .link = 1}));
+  for (int link = 1; link <= arm.joints; ++link) add_envelope(body, arm, radius_m, link);
   return body;
 }
 

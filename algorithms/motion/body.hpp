@@ -47,6 +47,11 @@ struct CameraBody {
 /// known yet. The sphere swallows the wrist, so it is held apart only from links four or more before its own.
 [[nodiscard]] Body body_with_envelope(const ArmModel& arm, double radius_m = 0.20, int link = -1);
 
+/// The arm with such a sphere about the origin of each link that moves: any of them may carry the camera. Joint 1 turns
+/// the sphere of link 1 onto itself, and its part below the arm's foot holds no camera: the allowance is raised to
+/// contain it, so the safe zone must be free around the shoulder, as it is by what the operator vouches for.
+[[nodiscard]] Body body_with_envelopes(const ArmModel& arm, double radius_m = 0.20);
+
 /// The arm with a camera whose mount is known (calibration validated).
 [[nodiscard]] Body body_with_camera(const ArmModel& arm, const Transform<Flange, Camera>& flange_T_camera,
                                     const CameraBody& camera = {});

@@ -51,16 +51,12 @@ TiltJoint tilt_joint(const ArmModel& arm, const JointVector& q_rad) {
   return best;
 }
 
-Turns base_turns(const ArmModel& arm, const JointVector& start, double step_rad, std::span<const double> tilts_rad) {
+Turns base_rounds(const ArmModel& arm, std::span<const JointVector> postures, double step_rad) {
   Turns turns;
-  const TiltJoint tilt = tilt_joint(arm, start);
-  const auto t = static_cast<std::size_t>(tilt.joint);
-  const Window w = window(arm.lower_rad[0], arm.upper_rad[0], start[0], step_rad);
+  if (postures.empty()) return turns;
+  const Window w = window(arm.lower_rad[0], arm.upper_rad[0], postures.front()[0], step_rad);
   bool backwards = false;
-  for (const double tilt_rad : tilts_rad) {
-    JointVector q = start;
-    q[tilt.joint] += tilt.up_sign * tilt_rad;
-    if (q[tilt.joint] < arm.lower_rad[t] || q[tilt.joint] > arm.upper_rad[t]) continue;
+  for (JointVector q : postures) {
     for (int i = 0; i < w.count && !turns.full(); ++i) {
       q[0] = w.first_rad + w.step_rad * (backwards ? w.count - 1 - i : i);
       turns.push_back(q);
@@ -68,6 +64,18 @@ Turns base_turns(const ArmModel& arm, const JointVector& start, double step_rad,
     backwards = !backwards;
   }
   return turns;
+}
+
+Turns base_turns(const ArmModel& arm, const JointVector& start, double step_rad, std::span<const double> tilts_rad) {
+  const TiltJoint tilt = tilt_joint(arm, start);
+  const auto t = static_cast<std::size_t>(tilt.joint);
+  Turns postures;
+  for (const double tilt_rad : tilts_rad) {
+    JointVector q = start;
+    q[tilt.joint] += tilt.up_sign * tilt_rad;
+    if (q[tilt.joint] >= arm.lower_rad[t] && q[tilt.joint] <= arm.upper_rad[t]) postures.push_back(q);
+  }
+  return base_rounds(arm, {postures.begin(), postures.end()}, step_rad);
 }
 
 }  // namespace firstlook

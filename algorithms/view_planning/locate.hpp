@@ -15,4 +15,13 @@ namespace firstlook {
                                          const Clearance& clearance, const JointVector& start,
                                          double horizontal_fov_rad);
 
+/// Further views for a camera on an inner link, which the tilts of locate_views do not move: each joint between the
+/// base joint and the one that tilts there is turned, both ways, the next joint with it where that gives the body more
+/// room, and the base turns as there. (The base joint alone moves a camera on link 1: locate_views has looked all
+/// around.) Certified as there; `start` itself is not among them. Empty when the arm has no such joints, or no room for
+/// them.
+[[nodiscard]] Turns locate_views_of_inner_links(const ArmModel& arm, const Body& body, const FreeSpace& space,
+                                                const Clearance& clearance, const JointVector& start,
+                                                double horizontal_fov_rad);
+
 }  // namespace firstlook

@@ -30,14 +30,21 @@ double horizontal_fov_rad(const CameraIntrinsics& camera) { return 2 * std::atan
 }  // namespace
 
 ViewList Workbench::locate_views(const FromHere& here) {
-  return list_of(firstlook::locate_views(arm_, envelope_body_, space_of(MotionPhase::kBeforeCalibration),
-                                         blind_terms_.clearance(), here.at_rad,
-                                         horizontal_fov_rad(color_.intrinsics())));
+  if (here.step > 0 && !searches_inner_links_) return {};
+  const MotionPhase phase = searching_phase();
+  const double fov_rad = horizontal_fov_rad(color_.intrinsics());
+  const Clearance clearance = blind_terms_.clearance();
+  if (here.step == 0) {
+    return list_of(firstlook::locate_views(arm_, body_of(phase), space_of(phase), clearance, here.at_rad, fov_rad));
+  }
+  return list_of(
+      firstlook::locate_views_of_inner_links(arm_, body_of(phase), space_of(phase), clearance, here.at_rad, fov_rad));
 }
 
 ViewList Workbench::identify_motions(const FromHere& here) {
-  return list_of(firstlook::identify_motions(arm_, envelope_body_, space_of(MotionPhase::kBeforeCalibration),
-                                             blind_terms_.clearance(), here.at_rad));
+  const MotionPhase phase = searching_phase();
+  return list_of(
+      firstlook::identify_motions(arm_, body_of(phase), space_of(phase), blind_terms_.clearance(), here.at_rad));
 }
 
 Status Workbench::read_picture(const hal::Frame& frame) {

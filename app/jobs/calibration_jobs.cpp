@@ -193,6 +193,7 @@ CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
 }
 
 CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
+  publish_blind(here.now_s, MotionPhase::kBeforeCalibration);
   const auto rough = rough_model();
   if (!rough) return next_bootstrap_view(here);
   const std::vector<std::size_t> counted = independent_observations();

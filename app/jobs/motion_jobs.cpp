@@ -49,8 +49,8 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
   };
   if (!mapping) {
     const Clearance blind = blind_terms_.clearance();
-    publish_blind(arguments.now_s);
-    plan_at(space_of(MotionPhase::kBeforeCalibration), {blind, blind, limits_});
+    publish_blind(arguments.now_s, arguments.phase);
+    plan_at(space_of(arguments.phase), {blind, blind, limits_});
     return result;
   }
   rebuild_free_space(arguments.now_s);

@@ -104,6 +104,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       boards_(boards_of(targets_)),
       limits_{config.arm.speed_max_m_s, config.arm.speed_max_rad_s, config.arm.acceleration_rad_s2},
       zone_cylinder_{config.safe_zone.radius_m, config.safe_zone.height_m, config.cart.top_m},
+      searching_body_(body_with_envelopes(arm, config.camera_envelope_radius_m)),
       envelope_body_(body_with_envelope(arm, config.camera_envelope_radius_m)),
       camera_body_(envelope_body_),
       blind_terms_(required_clearance(clearance_inputs(config))),
@@ -131,7 +132,10 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
   observations_.reserve((static_cast<std::size_t>(config.calibration.views_max) + 1) * boards_.size());
   way_sights_.reserve(kWaySightsMax);
   begin_alignment();
-  publish_blind(0);
+  searches_inner_links_ = configuration_is_free(arm_, searching_body_, space_of(MotionPhase::kLinkUnknown),
+                                                blind_terms_.clearance(), facts_.start_rad);
+  if (!searches_inner_links_) searching_body_ = envelope_body_;
+  publish_blind(0, searching_phase());
   published_.take();
 }
 
@@ -209,6 +213,7 @@ Status Workbench::take_memory() {
 }
 
 const Body& Workbench::body_of(MotionPhase phase) const {
+  if (phase == MotionPhase::kLinkUnknown) return searching_body_;
   return phase == MotionPhase::kMapping ? camera_body_ : envelope_body_;
 }
 
@@ -285,11 +290,11 @@ void Workbench::rebuild_free_space(double now_s) {
                      guardian_clearance(mapping_terms_->clearance(), mapping_terms_->stopping_m), free_mask_);
 }
 
-/// The guardian holds motions to what they are planned with: here the envelope in the safe zone. It contains the
+/// The guardian holds motions to what they are planned with: here the envelopes in the safe zone. They contain the
 /// camera, but not all of the capsules that stand for the camera once its place is known.
-void Workbench::publish_blind(double now_s) {
+void Workbench::publish_blind(double now_s, MotionPhase phase) {
   map_.free_mask(now_s, config_.map.free_max_age_s, free_mask_);
-  published_.publish(space_of(MotionPhase::kBeforeCalibration), envelope_body_,
+  published_.publish(space_of(phase), body_of(phase),
                      guardian_clearance(blind_terms_.clearance(), blind_terms_.stopping_m), free_mask_);
 }
 

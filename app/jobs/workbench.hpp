@@ -253,7 +253,11 @@ class Workbench {
   [[nodiscard]] double pose_sigma_m(const PosedFrame& posed, const LinkFrames& frames) const;
   void begin_mapping();
   void rebuild_free_space(double now_s);
-  void publish_blind(double now_s);
+  void publish_blind(double now_s, MotionPhase phase);
+  /// While the board is looked for and the camera's link is found.
+  [[nodiscard]] MotionPhase searching_phase() const {
+    return facts_.stored ? MotionPhase::kBeforeCalibration : MotionPhase::kLinkUnknown;
+  }
   void note_frame(const IntegrateArguments& arguments, const VoxelCounts& counts);
   void take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace);
 
@@ -269,7 +273,11 @@ class Workbench {
   SafeZone zone_cylinder_;
 
   Planner planner_;
-  Body envelope_body_;
+  Body searching_body_;  ///< a camera envelope on every link, or at the flange alone
+  Body envelope_body_;   ///< one at the flange
+  /// The safe zone has room for an envelope on every link where the arm starts. Without it (a UR10 in a zone of 0.5 m)
+  /// a camera is expected at the flange, and the inner joints are not turned for one on another link.
+  bool searches_inner_links_ = false;
   Body camera_body_;
   ClearanceTerms blind_terms_;  ///< before the calibration: no measurement is involved
   std::optional<ClearanceTerms> mapping_terms_;

@@ -76,7 +76,8 @@ using Route = FixedVector<Leg, kPathMax>;
 
 /// Which body and which free space a motion is certified for (safety rules 2 and 3).
 enum class MotionPhase : std::uint8_t {
-  kBeforeCalibration,  ///< camera envelope, safe zone only
+  kLinkUnknown,        ///< a camera envelope on every link, safe zone only
+  kBeforeCalibration,  ///< camera envelope at the flange, safe zone only
   kMapping,            ///< calibrated camera, known free space of the map
 };
 
@@ -92,7 +93,8 @@ struct NoArguments {      ///< kSolve, kValidate, kVerifyCalibration, kSummarize
 /// kLocateViews, kIdentifyMotions, kNextCalibrationView, kNextVerificationView, kNextSweepView, kNextView
 struct FromHere {
   JointVector at_rad;
-  std::uint32_t step = 0;  ///< counts the calls of this kind; seeds the candidates
+  std::uint32_t step = 0;  ///< counts the calls of this kind; seeds the candidates. kLocateViews: 1 for the views of a
+                           ///< camera on an inner link
   double now_s = 0;
   template <typename Archive>
   void fields(Archive& a) {

@@ -50,6 +50,8 @@ struct TargetView {
 struct Progress {
   ViewList views;                  ///< of LocateBoard, later of IdentifyLink
   std::uint32_t view = 0;          ///< position in `views`, in VerifyBoard in `target_views`
+  std::uint32_t searches = 0;      ///< for the board that found none: all views of one list were in vain
+  bool camera_on_flange = false;   ///< identified
   std::uint32_t observations = 0;  ///< views of the board taken for the calibration
   std::uint32_t failed_looks = 0;  ///< in a row, at calibration views
   std::uint32_t still_images = 0;  ///< joints that moved without moving the image

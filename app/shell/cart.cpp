@@ -31,16 +31,22 @@ bool is_phase(StateId state) {
   return !has_phases(state) && (parent == StateId::kNone || has_phases(parent));
 }
 
-/// Which link carries the camera, as far as the joints told it, and what no views from there could tell.
+/// Which link carries the camera, as far as the joints told it, what views from there cannot tell, and what would.
 std::string camera_link_text(const Ending& ending) {
-  std::string text = fmt::format(": it is on link {}", ending.camera_link_low);
-  if (ending.camera_link_high > ending.camera_link_low) text += fmt::format(" to {}", ending.camera_link_high);
-  if (ending.camera_link_low == 1) {
+  const int low = ending.camera_link_low, high = ending.camera_link_high;
+  std::string text = fmt::format(": it is on link {}", low);
+  if (high > low) text += fmt::format(" to {}", high);
+  if (low == 1) {
     text +=
         "; on link 1 joint 1 alone moves it, and views about one axis leave its place along that axis and its turn "
-        "about it open";
+        "about it open: a board whose place in the base is known, or a mount beyond joint 2, would tell them";
   }
-  return text + "; mount it on the flange";
+  if (high > 1) {
+    text +=
+        fmt::format("; on link {} joints 1 to {} move it about two axes or more, so that views could tell all of it",
+                    std::max(low, 2), std::max(low, 2));
+  }
+  return text + "; only a camera on the last link is calibrated so far: mount it on the flange";
 }
 
 std::string reason_text(const RunRecord& record, const Ending& ending) {

@@ -19,16 +19,33 @@ int motion_joint(Machine& m) {
   return moved_joint(m.progress().board_view_rad, m.progress().views.views_rad[m.progress().view]);
 }
 
+void conclude_on_inner_link(Machine& m, int low, int high) {
+  m.conclude(Outcome::kCalibrationRejected, Fault::kCameraOnInnerLink);
+  m.progress().ending.camera_link_low = low;
+  m.progress().ending.camera_link_high = high;
+}
+
+/// No joint changed the picture of the board; some may have lost it.
+void conclude_without_change(Machine& m) {
+  const Progress& p = m.progress();
+  if (p.still_images == 0) {  // nothing says that the camera is not on the arm: the board was lost each time
+    m.conclude(Outcome::kCalibrationRejected, Fault::kBoardNotFound);
+  } else if (p.still_joint == 0) {
+    m.conclude(Outcome::kCalibrationRejected, Fault::kCameraNotOnArm);
+  } else {
+    conclude_on_inner_link(m, 1, p.still_joint);  // the joints within the still one lost the board, or cannot move
+  }
+}
+
 void next_motion(Machine& m) {
   Progress& p = m.progress();
   if (p.view >= p.views.views_rad.size()) {
-    // Without a picture that stood still nothing says that the camera is not on the arm: the board was lost each time.
-    m.conclude(Outcome::kCalibrationRejected, p.still_images > 0 ? Fault::kCameraNotOnArm : Fault::kBoardNotFound);
+    conclude_without_change(m);
     return;
   }
   const JointVector& target = p.views.views_rad[p.view];
   m.show("identifying the camera's link, joint {}", motion_joint(m) + 1);
-  plan_to(m, target, MotionPhase::kBeforeCalibration);
+  plan_to(m, target, phase_of(m));
 }
 
 }  // namespace
@@ -58,11 +75,10 @@ Handled on_identify_link(Machine& m, const MachineEvent& event) {
       // An outer joint that moved the arm but not the image lies beyond the camera; one that took the board out of view
       // says nothing.
       if (p.still_images == 0) {
+        p.camera_on_flange = true;
         m.transition(StateId::kCollect);
       } else {
-        m.conclude(Outcome::kCalibrationRejected, Fault::kCameraOnInnerLink);
-        p.ending.camera_link_low = motion_joint(m) + 1;
-        p.ending.camera_link_high = p.still_joint;
+        conclude_on_inner_link(m, motion_joint(m) + 1, p.still_joint);
       }
     } else {
       // Each joint is turned to both sides at most: to the other one only when the board left the view on the first.

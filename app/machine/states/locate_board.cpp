@@ -6,13 +6,21 @@
 namespace firstlook::states {
 namespace {
 
-bool has_stored(const Machine& m) {
-  return m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
-}
-
 void leave(Machine& m) {
   m.progress().views = {};
   m.transition(has_stored(m) ? StateId::kVerifyCalibration : StateId::kIdentifyLink);
+}
+
+/// A camera that the tilts of the first search did not move may be on an inner link: the second one moves it.
+void search_in_vain(Machine& m) {
+  Progress& p = m.progress();
+  if (++p.searches > 1 || has_stored(m)) {
+    m.conclude(Outcome::kSafelyStopped, Fault::kBoardNotLocated);
+    return;
+  }
+  const JointVector start = p.views.views_rad.front();
+  p.views = {};
+  m.start_job(JobKind::kLocateViews, FromHere{start, p.searches, m.now().seconds()});
 }
 
 void go_to_view(Machine& m) {
@@ -23,12 +31,12 @@ void go_to_view(Machine& m) {
       leave(m);
       return;
     }
-    m.conclude(Outcome::kSafelyStopped, Fault::kBoardNotLocated);
+    search_in_vain(m);
     return;
   }
   m.show("looking for the {}, view {} of {}", m.settings().targets > 1 ? "boards" : "board", p.view + 1,
          p.views.views_rad.size());
-  plan_to(m, p.views.views_rad[p.view], MotionPhase::kBeforeCalibration);
+  plan_to(m, p.views.views_rad[p.view], phase_of(m));
 }
 
 void next_view(Machine& m) {
@@ -40,7 +48,7 @@ void next_view(Machine& m) {
 
 void enter_locate_board(Machine& m) {
   if (m.progress().views.views_rad.empty()) {
-    m.start_job(JobKind::kLocateViews, FromHere{m.arm().position_rad, 0, m.now().seconds()});
+    m.start_job(JobKind::kLocateViews, FromHere{m.arm().position_rad, m.progress().searches, m.now().seconds()});
   } else {
     go_to_view(m);
   }
@@ -52,7 +60,7 @@ Handled on_locate_board(Machine& m, const MachineEvent& event) {
     p.views = *list;
     p.view = 0;
     if (p.views.views_rad.empty()) {
-      m.conclude(Outcome::kSafelyStopped, list->fault);
+      m.conclude(Outcome::kSafelyStopped, p.searches > 0 ? Fault::kBoardNotLocated : list->fault);
     } else {
       go_to_view(m);
     }

@@ -40,7 +40,12 @@ Handled on_running(Machine& m, const MachineEvent& event) {
 bool may_move(hal::ArmSafety safety) { return safety == hal::ArmSafety::kNormal || safety == hal::ArmSafety::kReduced; }
 
 MotionPhase phase_of(Machine& m) {
-  return m.progress().calibration_accepted ? MotionPhase::kMapping : MotionPhase::kBeforeCalibration;
+  if (m.progress().calibration_accepted) return MotionPhase::kMapping;
+  return m.progress().camera_on_flange || has_stored(m) ? MotionPhase::kBeforeCalibration : MotionPhase::kLinkUnknown;
+}
+
+bool has_stored(const Machine& m) {
+  return m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
 }
 
 void plan_to(Machine& m, const JointVector& target, MotionPhase phase) {

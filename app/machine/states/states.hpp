@@ -56,5 +56,7 @@ void note_targets(Machine& m, TargetMask seen);
 void plan_to(Machine& m, const JointVector& target, MotionPhase phase);
 /// The body and space that motions are certified for now.
 [[nodiscard]] MotionPhase phase_of(Machine& m);
+/// The job is to use a calibration from elsewhere, which says that the camera is on the flange.
+[[nodiscard]] bool has_stored(const Machine& m);
 
 }  // namespace firstlook::states

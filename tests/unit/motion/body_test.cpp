@@ -57,6 +57,22 @@ TEST_CASE("the envelope is a sphere at the flange and is held apart from the arm
   CHECK(self_margin_m(place(body.capsules, forward(arm, open)), body.self_pairs) > 0);
 }
 
+TEST_CASE("a camera that may be on any link is in an envelope on each, and joint 1 is free to turn") {
+  for (const std::string_view name : {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"}) {
+    const ArmModel arm = *find_arm_model(name);
+    const Body body = body_with_envelopes(arm, 0.15);
+    for (int link = 1; link <= arm.joints; ++link) {
+      const std::size_t at = arm.body.size() + static_cast<std::size_t>(link) - 1;
+      CHECK(body.capsules[at].link == link);
+      CHECK(body.capsules[at].radius_m == 0.15);
+      CHECK((body.exempt[at] != 0) == (link == 1));
+    }
+  }
+  const ArmModel arm = *find_arm_model("ur5");
+  const Body body = body_with_envelopes(arm);
+  CHECK(self_margin_m(place(body.capsules, forward(arm, default_start(arm))), body.self_pairs) > 0);
+}
+
 TEST_CASE("the camera's capsules contain housing and cable around the mount") {
   const ArmModel arm = *find_arm_model("ur5");
   Pose mount = Pose::Identity();

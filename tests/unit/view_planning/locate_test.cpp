@@ -30,6 +30,41 @@ TEST_CASE("the board is looked for all around, each move certified in the safe z
   REQUIRE(views->size() > 16);   // more than one tilt
 }
 
+TEST_CASE("cameras on inner links look all around at several tilts, each move certified", "[locate]") {
+  const Body body = body_with_envelopes(kUr5);
+  const FreeSpace space;
+  const JointVector start = default_start(kUr5);
+  const auto outer = locate_views(kUr5, body, space, kClearance, start, kFov_rad);
+  REQUIRE(outer);
+  const Turns views = locate_views_of_inner_links(kUr5, body, space, kClearance, start, kFov_rad);
+  REQUIRE_FALSE(views.empty());
+  for (const std::size_t link : {2UL, 3UL}) {
+    const auto tilt_deg = [&](const JointVector& q) {  // of the link's x axis, from the horizon
+      return std::lround(std::asin(forward(kUr5, q).base_T_link[link].linear()(2, 0)) / 0.017453292519943295);
+    };
+    std::set<long> before, tilts;
+    for (const JointVector& q : *outer) before.insert(tilt_deg(q));
+    REQUIRE(before.size() == 1);
+    for (const JointVector& q : views) tilts.insert(tilt_deg(q));
+    REQUIRE(tilts.size() >= 3);
+  }
+  std::set<int> sectors;
+  JointVector at = start;
+  for (const JointVector& q : views) {
+    REQUIRE(certify(kUr5, body, space, kClearance, at, q).certified());
+    at = q;
+    const Eigen::Vector3d along = forward(kUr5, q).base_T_link[1].linear().col(0);
+    sectors.insert(static_cast<int>(std::floor(std::atan2(along.y(), along.x()) / kFov_rad)));
+  }
+  REQUIRE(sectors.size() >= 8);
+}
+
+TEST_CASE("inner links without room to turn leave no views", "[locate]") {
+  FreeSpace space;
+  space.zone.radius_m = 0.1;
+  REQUIRE(locate_views_of_inner_links(kUr5, kBody, space, kClearance, default_start(kUr5), kFov_rad).empty());
+}
+
 TEST_CASE("views behind a keep-out are skipped, the others stay", "[locate]") {
   FreeSpace space;
   space.keep_out_boxes.push_back({{0.15, -2, -1}, {2, 2, 2}});
