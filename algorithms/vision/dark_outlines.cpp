@@ -134,12 +134,27 @@ class OutlineFollower {
 
 }  // namespace
 
+namespace {
+
+/// cv::adaptiveThreshold with ADAPTIVE_THRESH_MEAN_C and THRESH_BINARY_INV, without its table: 255 where a pixel is at
+/// least so much darker than the mean of its window.
+cv::Mat darker_than_around(const cv::Mat& image, int window_px, int grays) {
+  cv::Mat mean, dark;
+  cv::boxFilter(image, mean, CV_8U, cv::Size(window_px, window_px), cv::Point(-1, -1), true,
+                cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  cv::subtract(mean, image, mean);  // 0 where the pixel is lighter
+  cv::compare(mean, grays, dark, cv::CMP_GE);
+  return dark;
+}
+
+}  // namespace
+
 std::vector<std::vector<cv::Point>> dark_outlines(const cv::Mat& image, int window_px,
                                                   const std::function<bool(cv::Size)>& may_be) {
-  constexpr double kDarker = 7;  // grey levels below the mean of the window
-  cv::Mat dark, bordered;
-  cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
-  cv::copyMakeBorder(dark, bordered, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  constexpr int kDarker = 7;  // grey levels below the mean of the window
+  cv::Mat bordered;
+  cv::copyMakeBorder(darker_than_around(image, window_px, kDarker), bordered, 1, 1, 1, 1, cv::BORDER_CONSTANT,
+                     cv::Scalar(0));
   Areas areas(bordered);
   const OutlineFollower follower(bordered);
   std::vector<std::vector<cv::Point>> outlines;

@@ -96,10 +96,10 @@ struct Side {
   [[nodiscard]] Eigen::Vector2d tangent(double t) const { return along + (f[1] + 2 * t * f[2]) * outward; }
 };
 
-/// Grey value between the centres of pixels, (u, v) at least 0 and less than the last pixel's centre.
-double gray_inside(GrayImage image, double u, double v) {
-  const int u0 = static_cast<int>(u), v0 = static_cast<int>(v);
-  const double a = u - u0, b = v - v0;
+/// gray_between of a point at least at the first and before the last pixel's centre.
+double gray_inside(GrayImage image, const Eigen::Vector2d& px) {
+  const int u0 = static_cast<int>(px.x()), v0 = static_cast<int>(px.y());
+  const double a = px.x() - u0, b = px.y() - v0;
   const std::uint8_t* top = &image.at(u0, v0);
   const std::uint8_t* low = top + image.width;
   return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * low[0] + a * low[1]);
@@ -114,34 +114,42 @@ struct EdgePoint {
   double rise = 0;  ///< grey levels from dark to white
 };
 
+constexpr double kEdgeStep_px = 0.5;
+
+/// Sums over the rises of the grey value from sample to sample.
+struct Rises {
+  double sum = 0;     ///< grey levels
+  double moment = 0;  ///< times the steps from the first sample to the middle of each rise
+};
+
+template <typename Gray>
+Rises sum_rises(const Eigen::Vector2d& first, const Eigen::Vector2d& step, int steps, Gray gray) {
+  Rises rises;
+  double before = gray(first);
+  for (int i = 1; i <= steps; ++i) {
+    const double here = gray(first + i * step);
+    const double rise = std::max(0.0, here - before);
+    rises.sum += rise;
+    rises.moment += rise * (i - 0.5);
+    before = here;
+  }
+  return rises;
+}
+
 /// Where the grey values rise across the side at t, within `reach_px` of its present curve: the centre of the rises.
 /// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
 std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t, double reach_px) {
-  constexpr double kStep_px = 0.5;
   constexpr double kRiseMin = 8;  // grey levels, all rises together
-  const double middle = side.f[0] + t * (side.f[1] + t * side.f[2]);
-  const Eigen::Vector2d on_line = side.start + t * side.along;
-  const int steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
-  const auto at = [&](double offset) -> Eigen::Vector2d { return on_line + offset * side.outward; };
+  const int steps = static_cast<int>(2 * reach_px / kEdgeStep_px + 0.5);
+  const double from_px = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
+  const Eigen::Vector2d first = side.start + t * side.along + from_px * side.outward;
+  const Eigen::Vector2d step = kEdgeStep_px * side.outward;
   // All samples lie between the ends: the border needs no thought where these are inside.
-  const bool inside =
-      is_inside(image, at(middle - reach_px)) && is_inside(image, at(middle - reach_px + steps * kStep_px));
-  const auto gray = [&](const Eigen::Vector2d& px) {
-    return inside ? gray_inside(image, px.x(), px.y()) : gray_between(image, px);
-  };
-  double sum = 0, moment = 0, rises = 0;
-  double before = gray(at(middle - reach_px));
-  for (int i = 1; i <= steps; ++i) {
-    const double offset = middle - reach_px + i * kStep_px;
-    const double here = gray(at(offset));
-    const double rise = std::max(0.0, here - before);
-    rises += rise;
-    sum += rise;
-    moment += rise * (offset - kStep_px / 2);
-    before = here;
-  }
-  if (rises < kRiseMin) return std::nullopt;
-  return EdgePoint{t, moment / sum, rises};
+  const bool inside = is_inside(image, first) && is_inside(image, first + steps * step);
+  const Rises rises = inside ? sum_rises(first, step, steps, [image](const auto& p) { return gray_inside(image, p); })
+                             : sum_rises(first, step, steps, [image](const auto& p) { return gray_between(image, p); });
+  if (rises.sum < kRiseMin) return std::nullopt;
+  return EdgePoint{t, from_px + kEdgeStep_px * rises.moment / rises.sum, rises.sum};
 }
 
 /// Least squares of degree 1 or 2, with the sum of squared residuals.
