@@ -26,9 +26,11 @@ struct Disc {
 
 constexpr double kAreaMin_px2 = 20;  ///< within the outline of a disc
 
-/// A dark ellipse from its contour; empty when the contour is none.
-std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
+/// A dark ellipse from its outline; empty when that is none.
+std::optional<Disc> disc_of(const Outline& outline) {
   constexpr double kElongationMax = 3.2, kAreaOfEllipseMin = 0.85, kAreaOfEllipseMax = 1.15;
+  static_assert(sizeof(Pixel) == sizeof(cv::Point));
+  const cv::Mat contour(static_cast<int>(outline.size()), 1, CV_32SC2, const_cast<Pixel*>(outline.data()));
   const cv::Moments m = cv::moments(contour);
   if (m.m00 < kAreaMin_px2) return std::nullopt;
   const double xx = m.mu20 / m.m00, yy = m.mu02 / m.m00, xy = m.mu11 / m.m00;
@@ -49,8 +51,8 @@ bool is_same(const Disc& a, const Disc& b) {
 
 void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
   // The outline runs through the outermost pixels' centres.
-  const auto may_be = [](cv::Size box) { return (box.width - 1) * (box.height - 1) >= kAreaMin_px2; };
-  for (const auto& outline : dark_outlines(image, window_px, may_be)) {
+  const auto may_be = [](int width, int height) { return (width - 1) * (height - 1) >= kAreaMin_px2; };
+  for (const Outline& outline : dark_outlines({image.data, image.cols, image.rows}, window_px, may_be)) {
     const auto disc = disc_of(outline);
     const auto same = [&](const Disc& d) { return is_same(d, *disc); };
     if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);

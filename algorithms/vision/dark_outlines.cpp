@@ -1,4 +1,4 @@
-/// The adapter to OpenCV's threshold. Areas and their outlines are ours.
+/// The adapter to OpenCV's filters: its types end here. Areas and their outlines are ours.
 #include "algorithms/vision/dark_outlines.hpp"
 
 #include <algorithm>
@@ -40,7 +40,7 @@ class Areas {
       boxes[first_of(i)] |= cv::Rect(run.begin, run.row, run.end - run.begin, 1);
     }
     for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-      if (runs_[i].area == i) f(cv::Point(runs_[i].begin, runs_[i].row), boxes[i].size());
+      if (runs_[i].area == i) f(Pixel{runs_[i].begin, runs_[i].row}, boxes[i].size());
     }
   }
 
@@ -99,17 +99,17 @@ class OutlineFollower {
 
   /// From the first pixel of an area (the leftmost of its highest) once around it; empty when that takes more than
   /// `length_max` pixels.
-  [[nodiscard]] std::optional<std::vector<cv::Point>> follow(cv::Point first, std::size_t length_max) const {
+  [[nodiscard]] std::optional<Outline> follow(Pixel first, std::size_t length_max) const {
     const std::uint8_t* const start = image_.ptr<std::uint8_t>(first.y) + first.x;
-    std::vector<cv::Point> outline;
+    Outline outline;
     std::size_t to = kLeft;
     do {
       to = (to - 1) % kNeighbours.size();
     } while (start[steps_[to]] == 0 && to != kLeft);
-    if (to == kLeft) return std::vector<cv::Point>{first};  // a single pixel
-    const std::uint8_t* const last = start + steps_[to];    // from where the outline comes back
+    if (to == kLeft) return Outline{first};               // a single pixel
+    const std::uint8_t* const last = start + steps_[to];  // from where the outline comes back
     const std::uint8_t* here = start;
-    for (cv::Point at = first;;) {
+    for (Pixel at = first;;) {
       if (outline.size() == length_max) return std::nullopt;
       outline.push_back(at);
       do {
@@ -117,7 +117,7 @@ class OutlineFollower {
       } while (here[steps_[to]] == 0);
       const std::uint8_t* const next = here + steps_[to];
       if (next == start && here == last) return outline;
-      at += kNeighbours[to];
+      at = {at.x + kNeighbours[to].x, at.y + kNeighbours[to].y};
       here = next;
       to = (to + kNeighbours.size() / 2) % kNeighbours.size();  // seen from there, where it came from
     }
@@ -126,7 +126,7 @@ class OutlineFollower {
  private:
   /// Counterclockwise in the picture, from the right.
   static constexpr std::size_t kLeft = 4;
-  static inline const std::array<cv::Point, 8> kNeighbours = {
+  static constexpr std::array<Pixel, 8> kNeighbours = {
       {{1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
   const cv::Mat& image_;
   std::array<std::ptrdiff_t, 8> steps_{};
@@ -149,20 +149,22 @@ cv::Mat darker_than_around(const cv::Mat& image, int window_px, int grays) {
 
 }  // namespace
 
-std::vector<std::vector<cv::Point>> dark_outlines(const cv::Mat& image, int window_px,
-                                                  const std::function<bool(cv::Size)>& may_be) {
+std::vector<Outline> dark_outlines(GrayImage image, int window_px,
+                                   const std::function<bool(int width, int height)>& may_be) {
   constexpr int kDarker = 7;  // grey levels below the mean of the window
+  // OpenCV has no read-only header for foreign pixels; nothing writes to it.
+  const cv::Mat pixels(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data));
   cv::Mat bordered;
-  cv::copyMakeBorder(darker_than_around(image, window_px, kDarker), bordered, 1, 1, 1, 1, cv::BORDER_CONSTANT,
+  cv::copyMakeBorder(darker_than_around(pixels, window_px, kDarker), bordered, 1, 1, 1, 1, cv::BORDER_CONSTANT,
                      cv::Scalar(0));
   Areas areas(bordered);
   const OutlineFollower follower(bordered);
-  std::vector<std::vector<cv::Point>> outlines;
-  areas.for_each([&](cv::Point first, cv::Size box) {
-    if (!may_be(box)) return;
+  std::vector<Outline> outlines;
+  areas.for_each([&](Pixel first, cv::Size box) {
+    if (!may_be(box.width, box.height)) return;
     auto outline = follower.follow(first, static_cast<std::size_t>(4 * (box.width + box.height)));
     if (!outline) return;
-    for (cv::Point& p : *outline) p -= cv::Point(1, 1);
+    for (Pixel& p : *outline) p = {p.x - 1, p.y - 1};
     outlines.push_back(std::move(*outline));
   });
   return outlines;

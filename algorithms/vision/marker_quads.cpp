@@ -35,10 +35,16 @@ bool is_same(const Quad& a, const Quad& b, double near_px) {
   return false;
 }
 
-/// The contour as a convex quadrangle, clockwise; empty when it is none.
-std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_min_px) {
-  const double perimeter = static_cast<double>(contour.size());
-  if (perimeter < 4 * side_min_px) return std::nullopt;
+/// The outline as OpenCV reads one, without a copy.
+cv::Mat as_points(const Outline& outline) {
+  static_assert(sizeof(Pixel) == sizeof(cv::Point));
+  return {static_cast<int>(outline.size()), 1, CV_32SC2, const_cast<Pixel*>(outline.data())};
+}
+
+/// The outline as a convex quadrangle, clockwise; empty when it is none.
+std::optional<Quad> quad_of(const Outline& outline, double side_min_px) {
+  if (static_cast<double>(outline.size()) < 4 * side_min_px) return std::nullopt;
+  const cv::Mat contour = as_points(outline);
   // A tenth of a side: bent or frayed sides stay one side.
   constexpr double kTolerance = 0.025;
   std::vector<cv::Point> polygon;
@@ -53,8 +59,8 @@ std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_m
 
 void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
   // No side is longer than the diagonal of the box.
-  const auto may_be = [&](cv::Size box) { return std::hypot(box.width - 1, box.height - 1) >= side_min_px; };
-  for (const auto& outline : dark_outlines(image, window_px, may_be)) {
+  const auto may_be = [&](int width, int height) { return std::hypot(width - 1, height - 1) >= side_min_px; };
+  for (const Outline& outline : dark_outlines({image.data, image.cols, image.rows}, window_px, may_be)) {
     const auto quad = quad_of(outline, side_min_px);
     if (!quad) continue;
     const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
