@@ -1,4 +1,4 @@
-/// From a depth frame to the map: exactly OctoMap's insertPointCloud(points, origin, maxrange, discretize = false).
+/// From a depth frame to the map: exactly OctoMap's insertPointCloud(points, origin, maxrange, discretize).
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,18 @@ struct InsertionResult : PixelCounts {
   FrameChange change;
 };
 
+/// Which rays a frame has.
+enum class RayEnds : std::uint8_t {
+  kPixels,        ///< one ray for each pixel with a return
+  kVoxelCenters,  ///< discretize = true: one to the centre of each voxel that holds a return; fewer and coarser
+};
+
 /// Holds the scratch memory for frames of one sensor into maps of one geometry; all of it is taken at construction.
 class Inserter {
  public:
-  Inserter(const GridGeometry& geometry, const DepthSensor& sensor);
-  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const DepthSensor& sensor);
+  Inserter(const GridGeometry& geometry, const DepthSensor& sensor, RayEnds ends = RayEnds::kPixels);
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const DepthSensor& sensor,
+                                                  RayEnds ends = RayEnds::kPixels);
 
   /// Updates `map` with one frame. Each pixel with a return gives a point; voxels that its ray passes are missed, the
   /// end voxel is hit, occupied wins, one update for each voxel. Beyond min(range_max_m, range_trusted_m) the ray
@@ -30,7 +37,7 @@ class Inserter {
                                                const Transform<Base, Depth>& base_T_depth,
                                                std::span<const float> self_depth_m, double stamp_s);
 
-  [[nodiscard]] const DepthSensor& sensor() const { return rays_.sensor(); }
+  [[nodiscard]] const DepthSensor& sensor() const { return sensor_; }
 
  private:
   [[nodiscard]] Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
@@ -41,14 +48,21 @@ class Inserter {
                     std::span<const float> self_depth_m, PixelCounts& counts);
   void mark_by_voxels(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                       std::span<const float> self_depth_m, PixelCounts& counts);
+  void mark_discretized(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                        std::span<const float> self_depth_m, PixelCounts& counts);
+  class DistinctEnds;
 
   GridGeometry geometry_;
-  DepthRays rays_;
+  DepthSensor sensor_;
+  RayEnds ends_;
+  double range_m_ = 0;  ///< where rays are cut: min(range_max_m, range_trusted_m)
+  DepthRays rays_;      ///< of voxel centres: not cut, because the centres decide
   RangeImage image_;
   std::vector<float> row_reach_m_;
   std::vector<std::int32_t> row_octant_;  ///< 8 * voxel + octant of each end; -1 outside the grid
   std::vector<std::uint64_t> missed_;
   std::vector<std::uint64_t> hit_;
+  std::vector<std::uint64_t> beyond_;  ///< voxels of returns beyond the range; of voxel centres only
 };
 
 }  // namespace firstlook

@@ -141,10 +141,10 @@ class VoxelMap {
   [[nodiscard]] bool has_motion_planes() const { return !flags_.empty(); }
 
   /// Applies one frame: one update for each voxel, occupied before free, none at a clamp.
-  /// @param missed, hit  bit i of word i / 64 is voxel i; bit_words(geometry) words
+  /// @param missed, hit  bit i of word i / 64 is voxel 64 * first_word + i; nothing happens outside these words
   /// @param stamp_s      not negative; kept in whole seconds
   FrameChange apply(std::span<const std::uint64_t> missed, std::span<const std::uint64_t> hit,
-                    const Transform<Base, Depth>& base_T_depth, double stamp_s);
+                    const Transform<Base, Depth>& base_T_depth, double stamp_s, std::size_t first_word = 0);
   [[nodiscard]] static std::size_t bit_words(const GridGeometry& geometry) { return (geometry.count() + 63) / 64; }
 
   /// Sets a voxel at its clamp (or unknown) as if two poses had seen it at `stamp_s`: for maps that come from

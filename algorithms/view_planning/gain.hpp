@@ -67,7 +67,6 @@ class GainModel {
   [[nodiscard]] std::span<const std::uint32_t> frontier() const { return frontier_; }
   /// Unknown voxels of the zone; from prepare().
   [[nodiscard]] std::size_t unknown() const { return unknown_; }
-  [[nodiscard]] std::span<const std::uint8_t> plane() const { return plane_; }
 
  private:
   /// The rays that no capsule of the body blocks; lives in the worker when some are.

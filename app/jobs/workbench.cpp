@@ -216,7 +216,7 @@ VoxelCounts Workbench::zone_counts() const {
 void Workbench::rebuild_free_space(double now_s) {
   if (mapping_terms_) revoke_zone();
   map_.free_mask(now_s, config_.map.free_max_age_s, free_mask_);
-  field_.rebuild(free_mask_);
+  field_.update(free_mask_);
   if (!mapping_terms_) return;
   mapping_space_ = space_of(MotionPhase::kMapping);
   for (std::size_t i = 0; i < free_mask_.size(); ++i) {
@@ -251,7 +251,7 @@ void Workbench::revoke_zone() {
     free_mask_[i] = taken ? 0 : 1;
     any_revoked_ = any_revoked_ || taken;
   }
-  if (any_revoked_) revoked_field_.rebuild(free_mask_);
+  if (any_revoked_) revoked_field_.update(free_mask_);
 }
 
 ViewContext Workbench::context(const Clearance& clearance) const {
