@@ -56,6 +56,23 @@ void end_octants(const GridGeometry& geometry, const RayRow& row, std::span<std:
              : compute_octants_portable(geometry, ends, octants.size(), octants.data());
 }
 
+/// Leaves the reach of pixels that have a ray, and the octants of those that have a hit.
+[[gnu::always_inline]] inline void keep_rays(const RayRow& row, std::int32_t* __restrict octants,
+                                             float* __restrict reach_m) {
+  const PixelKind* kind = row.kind.data();
+  const float* reach = row.reach_m.data();
+  for (std::size_t u = 0; u < row.kind.size(); ++u) {
+    reach_m[u] = static_cast<std::int32_t>(kind[u]) <= static_cast<std::int32_t>(PixelKind::kBeyond)
+                     ? reach[u]
+                     : RangeImage::kNoRay;
+    octants[u] = kind[u] == PixelKind::kHit ? octants[u] : -1;
+  }
+}
+FIRSTLOOK_AVX2 void keep_rays_avx2(const RayRow& row, std::int32_t* octants, float* reach_m) {
+  keep_rays(row, octants, reach_m);
+}
+void keep_rays_portable(const RayRow& row, std::int32_t* octants, float* reach_m) { keep_rays(row, octants, reach_m); }
+
 /// Rays that are cut only where OctoMap's keys end.
 DepthSensor without_range(DepthSensor sensor, double resolution_m) {
   sensor.range_max_m = sensor.range_trusted_m = kKeysMax * resolution_m;
@@ -123,39 +140,32 @@ void Inserter::mark_hit(VoxelMap& map, std::int32_t octant) {
   map.note_surface(index, static_cast<unsigned>(octant) & 7U);
 }
 
-void Inserter::note_reach(int v, const RayRow& row) {
-  for (std::size_t u = 0; u < row.kind.size(); ++u) {
-    row_reach_m_[u] = row.kind[u] <= PixelKind::kBeyond ? row.reach_m[u] : RangeImage::kNoRay;
-  }
+void Inserter::note_row(VoxelMap& map, int v, const RayRow& row) {
+  end_octants(geometry_, row, row_octant_);
+  (has_avx2() ? keep_rays_avx2 : keep_rays_portable)(row, row_octant_.data(), row_reach_m_.data());
   image_.set_row(v, row_reach_m_);
+  std::int32_t before = -1;  // neighbours often end in one place
+  for (const std::int32_t octant : row_octant_) {
+    if (octant != before) mark_hit(map, octant);
+    before = octant;
+  }
 }
 
 void Inserter::mark_by_rays(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                             std::span<const float> self_depth_m, PixelCounts& counts) {
   RayMarker marker(geometry_, base_T_depth.translation().cast<float>(), missed_);
   counts = rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) {
-    note_reach(v, row);
-    end_octants(geometry_, row, row_octant_);
+    note_row(map, v, row);
     for (std::size_t u = 0; u < row.kind.size(); ++u) {
-      if (row.kind[u] > PixelKind::kBeyond) continue;
-      marker.mark_passed({row.end_x_m[u], row.end_y_m[u], row.end_z_m[u]});
-      if (row.kind[u] == PixelKind::kHit) mark_hit(map, row_octant_[u]);
+      if (row.kind[u] <= PixelKind::kBeyond) marker.mark_passed({row.end_x_m[u], row.end_y_m[u], row.end_z_m[u]});
     }
   });
 }
 
 void Inserter::mark_by_voxels(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                               std::span<const float> self_depth_m, PixelCounts& counts) {
-  counts = rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) {
-    note_reach(v, row);
-    end_octants(geometry_, row, row_octant_);
-    std::int32_t before = -1;
-    for (std::size_t u = 0; u < row.kind.size(); ++u) {
-      if (row.kind[u] != PixelKind::kHit || row_octant_[u] == before) continue;
-      before = row_octant_[u];
-      mark_hit(map, before);
-    }
-  });
+  counts =
+      rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) { note_row(map, v, row); });
   image_.build_levels();
   mark_passed_voxels(geometry_, rays_, image_, depth, base_T_depth, hit_, missed_);
 }

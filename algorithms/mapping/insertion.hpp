@@ -42,7 +42,8 @@ class Inserter {
  private:
   [[nodiscard]] Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
   void mark_hit(VoxelMap& map, std::int32_t octant);
-  void note_reach(int v, const RayRow& row);
+  /// The row's reach, and its hits.
+  void note_row(VoxelMap& map, int v, const RayRow& row);
   /// Two ways to the same marks: along every ray of any image, or by the voxels of a pinhole image (much faster).
   void mark_by_rays(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                     std::span<const float> self_depth_m, PixelCounts& counts);
