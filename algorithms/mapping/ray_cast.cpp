@@ -180,59 +180,57 @@ struct Way {
   way.unsure = Ints{};
 }
 
-/// From room to room, until rays arrive somewhere or none is left.
+/// From one room to the next. @return false when no ray is left
 [[gnu::always_inline]] inline bool advance(const Eye& eye, Way& way, Arrivals& arrivals) {
-  while (bits_of(way.active) != 0) {
-    Ints index = Ints{} + eye.index;
-    for (int i = 0; i < 3; ++i) index += __builtin_convertvector(way.at[i], Ints) * way.stride[i];
-    index = way.active ? index : Ints{} + eye.index;
-    Ints room;
-    gather(eye.room, index, room);
-    const Ints lost = way.active & way.unsure & (room <= 1);
-    way.active &= ~lost;
+  if (!any(way.active)) return false;
+  Ints index = Ints{} + eye.index;
+  for (int i = 0; i < 3; ++i) index += __builtin_convertvector(way.at[i], Ints) * way.stride[i];
+  index = way.active ? index : Ints{} + eye.index;
+  Ints room;
+  gather(eye.room, index, room);
+  const Ints lost = way.active & way.unsure & (room <= 1);
+  way.active &= ~lost;
 
-    const Floats clear = __builtin_convertvector(room > 1 ? room : Ints{} + 1, Floats);
-    Floats leaves[3];
-    for (int i = 0; i < 3; ++i) leaves[i] = (way.at[i] + clear - way.from[i]) * way.per[i];
-    const Ints x = (leaves[0] <= leaves[1]) & (leaves[0] <= leaves[2]);
-    const Ints y = ~x & (leaves[1] <= leaves[2]);
-    const Ints through[3] = {x, y, ~x & ~y};
-    const Floats leave = x ? leaves[0] : y ? leaves[1] : leaves[2];
+  const Floats clear = __builtin_convertvector(room > 1 ? room : Ints{} + 1, Floats);
+  Floats leaves[3];
+  for (int i = 0; i < 3; ++i) leaves[i] = (way.at[i] + clear - way.from[i]) * way.per[i];
+  const Ints x = (leaves[0] <= leaves[1]) & (leaves[0] <= leaves[2]);
+  const Ints y = ~x & (leaves[1] <= leaves[2]);
+  const Ints through[3] = {x, y, ~x & ~y};
+  const Floats leave = x ? leaves[0] : y ? leaves[1] : leaves[2];
 
-    const Ints arrived = way.active & (room == 0);
-    arrivals.at = bits_of(arrived);
-    arrivals.walked = bits_of(lost);
-    arrivals.near = 0;
-    if (arrivals.at != 0) {
-      const Floats beyond = leave - way.nearest;
-      const Ints undecided = arrived & (beyond < eye.rounding) & (beyond > -eye.rounding);
-      arrivals.near = bits_of(beyond <= 0.0F);
-      if (const unsigned bits = bits_of(undecided); bits != 0 && eye.range_min_m > 0) {
-        arrivals.at &= ~bits;
-        arrivals.walked |= bits;
-        way.active &= ~undecided;
-      }
+  const Ints arrived = way.active & (room == 0);
+  arrivals.at = bits_of(arrived);
+  arrivals.walked = bits_of(lost);
+  arrivals.near = 0;
+  if (arrivals.at != 0) {
+    const Floats beyond = leave - way.nearest;
+    const Ints undecided = arrived & (beyond < eye.rounding) & (beyond > -eye.rounding);
+    arrivals.near = bits_of(beyond <= 0.0F);
+    if (const unsigned bits = bits_of(undecided); bits != 0 && eye.range_min_m > 0) {
+      arrivals.at &= ~bits;
+      arrivals.walked |= bits;
+      way.active &= ~undecided;
     }
-    arrivals.index = index;
-
-    // On to the next room. The rays that end, or leave the grid, are done.
-    const Floats over = leave - way.end;
-    const Ints ends = over > -eye.rounding;
-    arrivals.walked |= bits_of(way.active & ends & (over < eye.rounding));
-    Ints done = ends;
-    way.unsure = Ints{};
-    for (int i = 0; i < 3; ++i) {
-      const Floats point = way.from[i] + leave * way.size[i];
-      const Floats whole = __builtin_convertvector(__builtin_convertvector(point, Ints), Floats);
-      const Floats part = point - whole;
-      way.unsure |= ~through[i] & ((part < eye.rounding) | (part > 1.0F - eye.rounding));
-      way.at[i] = through[i] ? way.at[i] + clear : whole;
-      done |= __builtin_convertvector(way.at[i], Ints) > way.left[i];
-    }
-    way.active &= ~done;
-    if ((arrivals.at | arrivals.walked) != 0) return true;
   }
-  return false;
+  arrivals.index = index;
+
+  // On to the next room. The rays that end, or leave the grid, are done.
+  const Floats over = leave - way.end;
+  const Ints ends = over > -eye.rounding;
+  arrivals.walked |= bits_of(way.active & ends & (over < eye.rounding));
+  Ints done = ends;
+  way.unsure = Ints{};
+  for (int i = 0; i < 3; ++i) {
+    const Floats point = way.from[i] + leave * way.size[i];
+    const Floats whole = __builtin_convertvector(__builtin_convertvector(point, Ints), Floats);
+    const Floats part = point - whole;
+    way.unsure |= ~through[i] & ((part < eye.rounding) | (part > 1.0F - eye.rounding));
+    way.at[i] = through[i] ? way.at[i] + clear : whole;
+    done |= __builtin_convertvector(way.at[i], Ints) > way.left[i];
+  }
+  way.active &= ~done;
+  return true;
 }
 FIRSTLOOK_AVX2 void start_avx2(const Eye& eye, const Packet& packet, Way& way) { start(eye, packet, way); }
 void start_portable(const Eye& eye, const Packet& packet, Way& way) { start(eye, packet, way); }
@@ -258,26 +256,62 @@ Eye eye_of(const View& view) {
   return eye;
 }
 
-void count_packet(View& view, const Eye& eye, std::span<const Eigen::Vector3d> ends_m) {
+/// A packet on its way, and what it needs when rounding decides.
+struct Flight {
+  Way way;
+  std::span<const Eigen::Vector3d> ends_m;  // at most kLanes
+  unsigned walked;                          // lanes
+  bool is_over;
+};
+
+void take_off(const Eye& eye, std::span<const Eigen::Vector3d> ends_m, Flight& flight) {
   Packet packet{};
   packet.lanes = (1U << ends_m.size()) - 1;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Eigen::Vector3d& end_m = ends_m[std::min(lane, ends_m.size() - 1)];
     for (int i = 0; i < 3; ++i) packet.end_m[i][lane] = static_cast<float>(end_m[i]);
   }
-  Way way;
-  Arrivals arrivals;
-  has_avx2() ? start_avx2(eye, packet, way) : start_portable(eye, packet, way);
-  unsigned walked = 0;
-  while (has_avx2() ? advance_avx2(eye, way, arrivals) : advance_portable(eye, way, arrivals)) {
-    walked |= arrivals.walked;
-    for (unsigned bits = arrivals.at; bits != 0; bits &= bits - 1) {
-      const int lane = std::countr_zero(bits);
-      const bool far_enough = (arrivals.near >> lane & 1) == 0;
-      if (!view.meet(static_cast<std::size_t>(arrivals.index[lane]), far_enough)) way.active[lane] = 0;
+  (has_avx2() ? start_avx2 : start_portable)(eye, packet, flight.way);
+  flight.ends_m = ends_m;
+  flight.walked = 0;
+  flight.is_over = false;
+}
+
+void arrive(View& view, const Arrivals& arrivals, Flight& flight) {
+  flight.walked |= arrivals.walked;
+  for (unsigned bits = arrivals.at; bits != 0; bits &= bits - 1) {
+    const int lane = std::countr_zero(bits);
+    const bool far_enough = (arrivals.near >> lane & 1) == 0;
+    if (!view.meet(static_cast<std::size_t>(arrivals.index[lane]), far_enough)) flight.way.active[lane] = 0;
+  }
+}
+
+/// Some packets at once: each step of one waits for memory and for the step before, others fill the time.
+void count_packets(View& view, const Eye& eye, std::span<const Eigen::Vector3d> ends_m) {
+  constexpr std::size_t kTogether = 4;
+  std::array<Flight, kTogether> flights;
+  const auto step = has_avx2() ? advance_avx2 : advance_portable;
+  for (std::size_t first = 0; first < ends_m.size(); first += kTogether * kLanes) {
+    std::size_t flying = 0;
+    for (std::size_t i = first; i < ends_m.size() && flying < kTogether; i += kLanes, ++flying)
+      take_off(eye, ends_m.subspan(i, std::min<std::size_t>(kLanes, ends_m.size() - i)), flights[flying]);
+    for (std::size_t left = flying; left > 0;) {
+      for (Flight& flight : std::span(flights).first(flying)) {
+        if (flight.is_over) continue;
+        Arrivals arrivals;
+        if (!step(eye, flight.way, arrivals)) {
+          flight.is_over = true;
+          --left;
+        } else if ((arrivals.at | arrivals.walked) != 0) {
+          arrive(view, arrivals, flight);
+        }
+      }
+    }
+    for (const Flight& flight : std::span(flights).first(flying)) {
+      for (unsigned bits = flight.walked; bits != 0; bits &= bits - 1)
+        view.walk_to(flight.ends_m[static_cast<std::size_t>(std::countr_zero(bits))]);
     }
   }
-  for (; walked != 0; walked &= walked - 1) view.walk_to(ends_m[static_cast<std::size_t>(std::countr_zero(walked))]);
 }
 
 /// Distances in the maximum norm grow by one from neighbour to neighbour: a sweep forwards and one backwards find them
@@ -408,9 +442,7 @@ GainCount count_unknown(const GainPlane& plane, const GainRays& rays, const Tran
   const bool inside = (o.array() >= 0).all() && (o.array() < plane.geometry().size.cast<double>().array()).all();
   if (!inside) return count_unknown_by_walking(plane, rays, base_T_depth, range_min_m, scratch);
   const Eye eye = eye_of(view);
-  const std::span<const Eigen::Vector3d> ends_m(rays.ends_m);
-  for (std::size_t i = 0; i < ends_m.size(); i += kLanes)
-    count_packet(view, eye, ends_m.subspan(i, std::min<std::size_t>(kLanes, ends_m.size() - i)));
+  count_packets(view, eye, rays.ends_m);
   return view.count;
 }
 
