@@ -164,6 +164,7 @@ void narrate_alignment(const AlignmentRecord& alignment, Narrator& narrator) {
 void narrate_result(const RunRecord& record, Narrator& narrator) {
   narrator.clear_progress();
   narrator.line(fmt::format("{}: {}", name_of(record.outcome), record.reason));
+  if (!record.remedy.empty()) narrator.line("to do     " + record.remedy);
   if (record.hand_eye) {
     const Eigen::Vector3d t = 1000 * record.hand_eye->flange_T_camera.translation();
     const Eigen::Vector3d s = 1000 * record.hand_eye->sigma_translation_m;
@@ -291,6 +292,7 @@ struct Dispatch {
   int operator()(const RunCommand& c) const { return run_job(c); }
   int operator()(const CalibrateCommandOptions& c) const { return run_calibrate_command(c); }
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
+  int operator()(const ExportCommandOptions& c) const { return run_export_command(c); }
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {

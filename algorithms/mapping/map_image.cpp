@@ -50,7 +50,7 @@ Color ground(const GridGeometry& g, const Eigen::Vector3d& point_m, const Eigen:
 double face_brightness(int axis) { return axis == 2 ? 1.0 : axis == 0 ? 0.82 : 0.66; }
 
 // Follows one line of sight through the grid: veil of unknown voxels in front of the first occupied one or the floor.
-Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, const Eigen::Vector3d& point_m,
+Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, VoxelColor color_of, const Eigen::Vector3d& point_m,
            const Eigen::Vector3d& direction, double m_per_px) {
   const GridGeometry& g = map.geometry();
   const Eigen::Vector3d origin = point_m / g.resolution_m - g.first.cast<double>();
@@ -88,10 +88,10 @@ Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, const Eigen:
     while (g.contains(v)) {
       const std::size_t index = g.index(v);
       const VoxelClass voxel_class = map.voxel_class(index);
-      if (voxel_class == VoxelClass::kOccupied) {
-        const std::array<std::uint8_t, 3> base = height_color((v.z() + 0.5) / g.size.z());
+      const auto base = voxel_class == VoxelClass::kOccupied ? color_of(index) : std::nullopt;
+      if (base) {
         const double light = face_brightness(face);
-        over({base[0] * light, base[1] * light, base[2] * light}, 1);
+        over({(*base)[0] * light, (*base)[1] * light, (*base)[2] * light}, 1);
         return color;
       }
       if (voxel_class == VoxelClass::kUnknown && !zone.empty() && zone[index] != 0) over(kVeil, kVeilOpacity);
@@ -179,13 +179,22 @@ Eigen::Vector2d MapProjection::pixel(const Eigen::Vector3d& point_m) const {
 }
 
 void draw_map(const VoxelMap& map, const Viewpoint& viewpoint, std::span<const std::uint8_t> zone, RgbImage image) {
+  const GridGeometry& g = map.geometry();
+  const auto by_height = [&g](std::size_t index) {
+    return std::optional(height_color((g.voxel_at(index).z() + 0.5) / g.size.z()));
+  };
+  draw_map(map, viewpoint, zone, by_height, image);
+}
+
+void draw_map(const VoxelMap& map, const Viewpoint& viewpoint, std::span<const std::uint8_t> zone, VoxelColor color_of,
+              RgbImage image) {
   ENSURE(3082, image.data != nullptr && image.width > 0 && image.height > 0);
   ENSURE(3083, zone.empty() || zone.size() == map.size());
   const MapProjection projection(viewpoint, image.width, image.height);
   for (int row = 0; row < image.height; ++row) {
     for (int column = 0; column < image.width; ++column) {
       put(image, column, row,
-          look(map, zone, projection.through(column, row), projection.into(), projection.m_per_px()));
+          look(map, zone, color_of, projection.through(column, row), projection.into(), projection.m_per_px()));
     }
   }
 }

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "algorithms/mapping/voxel_map.hpp"
+#include "platform/core/function_ref.hpp"
 
 namespace firstlook {
 
@@ -69,5 +72,10 @@ inline constexpr double kFloorLines_m = 0.5;  ///< distance of the lines on the 
 /// The map in parallel projection, on a floor with lines every kFloorLines_m: occupied voxels coloured by height and
 /// shaded by face, and where `zone` is not empty the unknown ones inside it as a translucent veil.
 void draw_map(const VoxelMap& map, const Viewpoint& viewpoint, std::span<const std::uint8_t> zone, RgbImage image);
+
+/// The colour of an occupied voxel before its faces are shaded; empty: it is looked through.
+using VoxelColor = FunctionRef<std::optional<std::array<std::uint8_t, 3>>(std::size_t index)>;
+void draw_map(const VoxelMap& map, const Viewpoint& viewpoint, std::span<const std::uint8_t> zone, VoxelColor color_of,
+              RgbImage image);
 
 }  // namespace firstlook

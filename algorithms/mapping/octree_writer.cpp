@@ -126,14 +126,6 @@ std::size_t count_nodes(const Leaves& leaves, const Node& node) {
   return nodes;
 }
 
-void write_header(std::string_view kind, const VoxelMap& map, std::size_t nodes, ByteSink sink) {
-  const std::string header = fmt::format(
-      "# Octomap OcTree {}file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
-      "id OcTree\nsize {}\nres {}\ndata\n",
-      kind, nodes, map.geometry().resolution_m);
-  sink(std::as_bytes(std::span(header)));
-}
-
 // Two bits a child, the lower bit first: free 1 0, occupied 0 1, has children 1 1, unknown 0 0.
 void write_binary_node(const Leaves& leaves, const Node& node, ByteSink sink) {
   const std::array<NodeState, 8> children = children_of(leaves, node);
@@ -168,25 +160,45 @@ void write_full_node(const Leaves& leaves, const Node& node, const NodeState& st
   }
 }
 
+const Node kRoot{Eigen::Vector3i::Zero(), 0};
+
+void write_nodes(const Leaves& leaves, bool binary, ByteSink sink) {
+  const NodeState root = state_of(leaves, kRoot);
+  if (root.shape == Shape::kAbsent) return;
+  binary ? write_binary_node(leaves, kRoot, sink) : write_full_node(leaves, kRoot, root, sink);
+}
+
+void write_file(const Leaves& leaves, bool binary, double resolution_m, ByteSink sink) {
+  const bool empty = state_of(leaves, kRoot).shape == Shape::kAbsent;
+  const std::string header = fmt::format(
+      "# Octomap OcTree {}file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
+      "id OcTree\nsize {}\nres {}\ndata\n",
+      binary ? "binary " : "", empty ? 0 : count_nodes(leaves, kRoot), resolution_m);
+  sink(std::as_bytes(std::span(header)));
+  write_nodes(leaves, binary, sink);
+}
+
+Leaves checked_cut(const VoxelMap& map, int depth, ClassReading reading) {
+  ENSURE(3051, depth >= 1 && depth <= kOctreeDepth);
+  return cut(map, depth, reading);
+}
+
 }  // namespace
 
 void write_bt(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink) {
-  ENSURE(3051, depth >= 1 && depth <= kOctreeDepth);
-  const Leaves leaves = cut(map, depth, reading);
-  const Node root{Eigen::Vector3i::Zero(), 0};
-  const bool empty = state_of(leaves, root).shape == Shape::kAbsent;
-  write_header("binary ", map, empty ? 0 : count_nodes(leaves, root), sink);
-  if (!empty) write_binary_node(leaves, root, sink);
+  write_file(checked_cut(map, depth, reading), true, map.geometry().resolution_m, sink);
 }
 
 void write_ot(const VoxelMap& map, int depth, ByteSink sink) {
-  ENSURE(3053, depth >= 1 && depth <= kOctreeDepth);
-  const Leaves leaves = cut(map, depth, nullptr);
-  const Node root{Eigen::Vector3i::Zero(), 0};
-  const NodeState state = state_of(leaves, root);
-  const bool empty = state.shape == Shape::kAbsent;
-  write_header("", map, empty ? 0 : count_nodes(leaves, root), sink);
-  if (!empty) write_full_node(leaves, root, state, sink);
+  write_file(checked_cut(map, depth, nullptr), false, map.geometry().resolution_m, sink);
+}
+
+void write_bt_nodes(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink) {
+  write_nodes(checked_cut(map, depth, reading), true, sink);
+}
+
+void write_ot_nodes(const VoxelMap& map, int depth, ByteSink sink) {
+  write_nodes(checked_cut(map, depth, nullptr), false, sink);
 }
 
 }  // namespace firstlook

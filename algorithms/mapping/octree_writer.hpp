@@ -18,4 +18,8 @@ void write_bt(const VoxelMap& map, ClassReading reading, int depth, ByteSink sin
 /// `.ot`: with log-odds in OctoMap's units, which know nothing of octants; depth as above.
 void write_ot(const VoxelMap& map, int depth, ByteSink sink);
 
+/// The nodes of the same files without their header: what OctoMap calls binary data and data, and messages carry.
+void write_bt_nodes(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink);
+void write_ot_nodes(const VoxelMap& map, int depth, ByteSink sink);
+
 }  // namespace firstlook

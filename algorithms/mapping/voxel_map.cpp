@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "algorithms/kinematics/self_collision.hpp"
 #include "algorithms/mapping/log_odds_update.hpp"
@@ -58,6 +59,11 @@ VoxelMap::VoxelMap(const GridGeometry& geometry, Planes planes) : geometry_(geom
   seen_s_.assign(geometry.count(), 0);
   poses_.reserve(kPosesMax);
   different_.assign(kPosesMax + 1, 0);
+}
+
+VoxelMap::VoxelMap(const GridGeometry& geometry, std::vector<std::int8_t> log_odds)
+    : geometry_(geometry), log_odds_(std::move(log_odds)) {
+  ENSURE(3006, log_odds_.size() == geometry.count());
 }
 
 std::size_t VoxelMap::required_bytes(const GridGeometry& geometry, Planes planes) {

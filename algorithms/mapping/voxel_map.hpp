@@ -77,6 +77,8 @@ class VoxelMap {
     kLogOddsOnly,  ///< a tenth of the memory; nothing is ever known free and there is no safe zone: for offline maps
   };
   explicit VoxelMap(const GridGeometry& geometry, Planes planes = Planes::kAll);
+  /// A map from elsewhere, kLogOddsOnly. @param log_odds  geometry.count() values: kUnknownLogOdds or within the clamps
+  VoxelMap(const GridGeometry& geometry, std::vector<std::int8_t> log_odds);
 
   /// Bytes that a map of this geometry occupies.
   [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, Planes planes = Planes::kAll);

@@ -85,6 +85,18 @@ void GainModel::prepare(const ViewContext& context) {
   }
   plane_.prepare(UnknownReading::kSeeThrough);
   find_frontier(context);
+  if (context.prior != nullptr) prepare_prior(context);
+}
+
+void GainModel::prepare_prior(const ViewContext& context) {
+  ENSURE(4513, prior_plane_ && context.prior->geometry() == geometry_);
+  const std::span<const std::uint8_t> what = plane_.what();
+  const std::span<std::uint8_t> prior = prior_plane_->what();
+  for (std::size_t i = 0; i < what.size(); ++i) {
+    const bool expected = what[i] == kUnknownWeight && context.prior->voxel_class(i) == VoxelClass::kOccupied;
+    prior[i] = what[i] == kOpaque ? kOpaque : expected ? std::uint8_t{1} : kPass;
+  }
+  prior_plane_->prepare(UnknownReading::kSeeThrough);
 }
 
 void GainModel::find_frontier(const ViewContext& context) {
@@ -129,7 +141,12 @@ ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, 
   const GainRays& rays = free_rays(context, frames, base_T_depth, worker);
   const GainCount counted = count_unknown(plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch);
   const auto unknown = static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
-  return {.unknown = unknown, .again = counted.voxels - unknown};
+  ViewGain gain{.unknown = unknown, .again = counted.voxels - unknown};
+  if (context.prior != nullptr) {
+    gain.expected_surface =
+        count_unknown(*prior_plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch).voxels;
+  }
+  return gain;
 }
 
 std::size_t GainModel::remember_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) {

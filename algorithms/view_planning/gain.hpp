@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -47,8 +48,12 @@ class GainModel {
   GainModel(const GridGeometry& geometry, const DepthSensor& sensor, const GainSampling& sampling = {});
   [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const GainSampling& sampling = {});
 
-  /// Reads map, zone and free space. Unknown voxels of the zone count; free ones that motion cannot use yet count as
-  /// `again`; voxels with futile_max futile looks stop rays like occupied ones.
+  /// Takes the memory that contexts with a prior map need: prior_bytes().
+  void allow_prior() { prior_plane_.emplace(geometry_); }
+  [[nodiscard]] static std::size_t prior_bytes(const GridGeometry& geometry) { return GainPlane::required_bytes(geometry); }
+
+  /// Reads map, zone, free space and prior map (after allow_prior() only). Unknown voxels of the zone count; free ones
+  /// that motion cannot use yet count as `again`; voxels with futile_max futile looks stop rays like occupied ones.
   void prepare(const ViewContext& context);
 
   /// What a look at configuration q would tell on the prepared map. Rays end at the trusted range; nearer than the
@@ -73,6 +78,7 @@ class GainModel {
   const GainRays& free_rays(const ViewContext& context, const LinkFrames& frames,
                             const Transform<Base, Depth>& base_T_depth, GainWorker& worker) const;
   void find_frontier(const ViewContext& context);
+  void prepare_prior(const ViewContext& context);
 
   GridGeometry geometry_;
   DepthSensor sensor_;
@@ -80,6 +86,7 @@ class GainModel {
   GainRays rays_;
   double half_cone_rad_ = 0;  ///< the widest ray off the optical axis
   GainPlane plane_;
+  std::optional<GainPlane> prior_plane_;  ///< 1 where a surface is expected; empty: no prior map is allowed
   std::size_t unknown_ = 0;
   std::vector<std::uint32_t> frontier_;
   FutileLooks futile_;

@@ -25,6 +25,8 @@ struct ViewContext {
   /// Free voxels that motion could not use at this time any more want another look before it comes (safety rule 1).
   double fresh_until_s = 0;
   double free_max_age_s = std::numeric_limits<double>::infinity();
+  /// An earlier map of the cell in the same grid, or null: a hint where surfaces are, which makes nothing known.
+  const VoxelMap* prior = nullptr;
 };
 
 /// What a view has to cost beside the move, and how fast the arm may be: the denominator of utility.
@@ -36,11 +38,13 @@ struct ViewTiming {
 
 /// What a look from one place is expected to tell.
 struct ViewGain {
-  std::uint32_t unknown = 0;  ///< unknown voxels of the zone, each once: what coverage counts
-  std::uint32_t again = 0;    ///< free, but motion cannot use them, or not for long (safety rule 1)
+  std::uint32_t unknown = 0;           ///< unknown voxels of the zone, each once: what coverage counts
+  std::uint32_t again = 0;             ///< free, but motion cannot use them, or not for long (safety rule 1)
+  std::uint32_t expected_surface = 0;  ///< of `unknown`: where an earlier map has a surface
 
-  /// A voxel that needs another look is half known for motion: it weighs a quarter of one that was never seen.
-  [[nodiscard]] double weight() const { return unknown + 0.25 * again; }
+  /// A voxel that needs another look is half known for motion: it weighs a quarter of one that was never seen. One with
+  /// an expected surface weighs twice: it is where the space that is free will end.
+  [[nodiscard]] double weight() const { return unknown + 0.25 * again + expected_surface; }
 };
 
 }  // namespace firstlook

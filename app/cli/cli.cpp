@@ -48,13 +48,15 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   RunCommand run;
   ConfigFlags run_flags;
-  std::string only = "everything", sensor = "full", calibration, views = "firstlook";
+  std::string only = "everything", sensor = "full", calibration, prior, views = "firstlook";
   CLI::App* run_app = app.add_subcommand("run", "the whole job or a part of it, in a simulated cell");
   run_flags.add_to(*run_app);
   run_app->add_option("--only", only, "a part of the job; map and verify test a stored calibration first")
       ->check(CLI::IsMember({"everything", "calibrate", "map", "verify"}));
   run_app->add_option("--calibration", calibration,
                       "hand_eye.yaml of an earlier run, for --only map and --only verify");
+  run_app->add_option("--prior-map", prior,
+                      "an earlier map of the cell, .bt or .ot: where to look first, and what changed");
   run_app->add_option("--views", views, "how the views for the map are chosen: firstlook is all there is")
       ->check([](const std::string& name) {
         return name == "firstlook" ? std::string()
@@ -99,13 +101,36 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");
 
   MapCommandOptions map;
-  std::string map_dataset, map_out;
-  CLI::App* map_app = app.add_subcommand("map", "a map from recorded depth frames");
-  map_app->add_option("--dataset", map_dataset, "folder in TUM RGB-D layout")->required();
+  std::string map_dataset, map_from, map_prior, map_out;
+  CLI::App* map_app = app.add_subcommand("map", "a map from recorded depth frames or a file, and what is in it");
+  map_app->add_option("--dataset", map_dataset, "folder in TUM RGB-D layout");
+  map_app->add_option("--from", map_from, "a stored map instead: .bt or .ot");
   map_app->add_option("--resolution", map.resolution_m, "voxel size in metres")->capture_default_str();
   map_app->add_option("--max-range", map.range_max_m, "rays are cut here, metres")->capture_default_str();
-  map_app->add_option("--out", map_out, "folder for collision_map.bt, map.ot and map.ply");
+  map_app->add_flag("--sort", map.sort, "depth.txt is not in the order of time: sort it, instead of refusing frames");
+  map_app->add_option("--prior-map", map_prior, "an earlier map, .bt or .ot: say what changed since");
+  map_app->add_flag("--objects", map.objects, "list connected occupied voxels as planes, boxes and others");
+  map_app
+      ->add_option("--move", map.moves,
+                   "ID,dx,dy,dz: move an object of --objects, metres; what it uncovers becomes unknown")
+      ->allow_extra_args(false);
+  map_app->add_option("--at", map.at, "X,Y,Z: what is known of a place, metres");
+  map_app->add_option("--out", map_out,
+                      "folder for collision_map.bt, map.ot, map.ply; frames.csv of a dataset; objects.png");
+  map_app->add_option("--depth", map.depth, "cut the trees of --out at this depth: 16 whole, 15 twice as coarse ..")
+      ->capture_default_str();
   map_app->add_flag("--json", map.json, "print the counts as JSON");
+
+  ExportCommandOptions export_options;
+  std::string export_run, export_out;
+  CLI::App* export_app = app.add_subcommand("export", "what a run found, in the files of other programs");
+  export_app->add_option("run", export_run, "folder of a run, or of `firstlook map --out`")->required();
+  export_app
+      ->add_option("--to", export_options.to,
+                   "ros2, ros1: calibration, and the map as octomap message; moveit: scenes; ur: URScript; csv: tables")
+      ->required()
+      ->check(CLI::IsMember({"ros2", "ros1", "moveit", "ur", "csv"}));
+  export_app->add_option("--out", export_out, "folder for the files (default RUN/export/TO)");
 
   BoardCommandOptions board;
   CLI::App* board_app = app.add_subcommand("board", "a printable target at true size");
@@ -165,14 +190,22 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       }
       run.sources.flags.push_back({"calibration.stored", calibration, "--calibration"});
     }
+    if (!prior.empty()) run.sources.flags.push_back({"map.prior", prior, "--prior-map"});
     run.fast_sensor = sensor == "fast";
     return {run, 0};
   }
   if (calibrate_app->parsed()) return {calibrate, 0};
   if (map_app->parsed()) {
     map.dataset = map_dataset;
+    map.from = map_from;
+    map.prior = map_prior;
     map.out = map_out;
     return {map, 0};
+  }
+  if (export_app->parsed()) {
+    export_options.run = export_run;
+    export_options.out = export_out;
+    return {export_options, 0};
   }
   if (board_app->parsed()) return {board, 0};
   if (replay_app->parsed()) return {replay, 0};

@@ -2,146 +2,221 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
-#include "algorithms/mapping/insertion.hpp"
-#include "algorithms/mapping/octree_writer.hpp"
-#include "algorithms/mapping/ply_writer.hpp"
-#include "app/dataset/mapping_dataset.hpp"
+#include "algorithms/mapping/map_change.hpp"
+#include "algorithms/mapping/objects.hpp"
+#include "app/dataset/dataset_mapping.hpp"
+#include "app/dataset/map_file.hpp"
+#include "app/report/map_files.hpp"
+#include "app/report/map_json.hpp"
+#include "app/report/object_picture.hpp"
+#include "app/report/picture_bytes.hpp"
+#include "platform/linux/files.hpp"
 
 namespace firstlook {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr int kExitDone = 0, kExitUsage = 2, kExitData = 3;
 constexpr double kResolutionMin_m = 0.002, kResolutionMax_m = 1.0;
 constexpr double kRangeLimit_m = 50;
-// Log-odds and two bit planes: 640 MiB at most.
-constexpr double kVoxelsMax = 512.0 * 1024 * 1024;
+constexpr double kPlaceMax_m = 1e6;
+constexpr double kPictureAzimuth_rad = -2.2;
+constexpr std::size_t kRefusedNarrated = 10;
 
-DepthSensor offline_sensor(const MappingDataset& dataset, double range_max_m) {
-  DepthSensor sensor;
-  sensor.intrinsics = dataset.intrinsics;
-  sensor.range_min_m = 0;  // what the recording holds is taken as it is
-  sensor.range_max_m = sensor.range_trusted_m = range_max_m;
-  return sensor;
-}
-
-// Names the frame in an error of its pixels or pose.
-std::unexpected<Error> refused(const MappingFrame& frame, const Error& error) {
-  return failure(Fault::kDataMalformed, "{}: {}", frame.image.string(), error.detail());
-}
-
-// The grid that holds every ray of every frame.
-Result<GridGeometry> fit_extents(const MappingDataset& dataset, DepthRays& rays, double resolution_m) {
-  AxisBox box;
-  for (const MappingFrame& frame : dataset.frames) {
-    const Result<DepthPixels> image = read_depth_png(frame.image);
-    if (!image) return std::unexpected(image.error());
-    const DepthImage depth = image->view(dataset.units_per_m);
-    if (const Status status = rays.check(depth, frame.map_T_depth, {}); !status) return refused(frame, status.error());
-    const AxisBox bounds = rays.bounds(depth, frame.map_T_depth);
-    const bool first = &frame == &dataset.frames.front();
-    box.low_m = first ? bounds.low_m : Eigen::Vector3d(box.low_m.cwiseMin(bounds.low_m));
-    box.high_m = first ? bounds.high_m : Eigen::Vector3d(box.high_m.cwiseMax(bounds.high_m));
-  }
-  // One voxel on each side, for points on a boundary.
-  const Eigen::Vector3d margin_m = Eigen::Vector3d::Constant(resolution_m);
-  const Eigen::Vector3d voxels = (box.high_m - box.low_m + 2 * margin_m) / resolution_m;
-  const double reach_m = 32000 * resolution_m;  // OctoMap's keys end at 32768 voxels
-  if (voxels.prod() > kVoxelsMax || box.low_m.minCoeff() < -reach_m || box.high_m.maxCoeff() > reach_m)
-    return failure(Fault::kMapTooLarge, "{:.0f} x {:.0f} x {:.0f} voxels of {} m about ({:.1f}, {:.1f}, {:.1f})",
-                   voxels.x(), voxels.y(), voxels.z(), resolution_m, box.low_m.x(), box.low_m.y(), box.low_m.z());
-  return GridGeometry::covering(box.low_m - margin_m, box.high_m + margin_m, resolution_m);
-}
-
-nlohmann::ordered_json to_json(const VoxelCounts& counts) {
-  return {{"unknown", counts.unknown}, {"free", counts.free}, {"occupied", counts.occupied}};
-}
-
-nlohmann::ordered_json to_json(const MappingFrame& frame, const InsertionResult& result, const VoxelCounts& counts) {
-  return {
-      {"stamp_s", frame.stamp_s},
-      {"image", frame.image.filename().string()},
-      {"pixels",
-       {{"used", result.pixels_used}, {"beyond_range", result.pixels_beyond}, {"without_return", result.pixels_empty}}},
-      {"voxels_missed", result.change.voxels_missed},
-      {"voxels_hit", result.change.voxels_hit},
-      {"voxels_discovered", result.change.voxels_discovered},
-      {"voxels", to_json(counts)}};
-}
-
-struct Mapped {
-  VoxelMap map;
-  nlohmann::ordered_json frames = nlohmann::ordered_json::array();
+/// What the options ask about the map.
+struct Questions {
+  std::optional<Eigen::Vector3d> place_m;
+  std::vector<ObjectMove> moves;
 };
 
-Result<Mapped> map_dataset(const MappingDataset& dataset, const MapCommandOptions& options) {
-  const DepthSensor sensor = offline_sensor(dataset, options.range_max_m);
-  DepthRays rays(sensor);
-  const Result<GridGeometry> geometry = fit_extents(dataset, rays, options.resolution_m);
-  if (!geometry) return std::unexpected(geometry.error());
-  fmt::print(stderr, "grid of {} x {} x {} voxels of {} m\n", geometry->size.x(), geometry->size.y(),
-             geometry->size.z(), options.resolution_m);
-  Mapped mapped{VoxelMap(*geometry, VoxelMap::Planes::kLogOddsOnly), nlohmann::ordered_json::array()};
-  Inserter inserter(*geometry, sensor);
-  for (const MappingFrame& frame : dataset.frames) {
-    const Result<DepthPixels> image = read_depth_png(frame.image);
-    if (!image) return std::unexpected(image.error());
-    const Result<InsertionResult> result =
-        inserter.insert(mapped.map, image->view(dataset.units_per_m), frame.map_T_depth, {}, frame.stamp_s);
-    if (!result) return refused(frame, result.error());
-    const VoxelCounts counts = mapped.map.counts();
-    mapped.frames.push_back(to_json(frame, *result, counts));
-    fmt::print(stderr, "{}: {} of {} pixels used, {} voxels discovered; {} free, {} occupied\n",
-               frame.image.filename().string(), result->pixels_used, image->pixels.size(),
-               result->change.voxels_discovered, counts.free, counts.occupied);
+/// A map, where it comes from, and the answers.
+struct Answers {
+  VoxelMap map;
+  std::optional<MappingDataset> dataset;
+  std::vector<FrameOutcome> frames;
+  std::size_t frames_refused = 0;
+  std::optional<PlaceSeen> seen;
+  std::optional<MapObjects> objects;
+  std::optional<PlaceKnown> place;
+  std::optional<MapChange> change;
+};
+
+/// As many finite numbers with commas between them as there is room for, and nothing else.
+bool read_numbers(std::string_view text, std::span<double> numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const bool last = i + 1 == numbers.size();
+    const std::size_t end = last ? text.size() : text.find(',');
+    if (end == std::string_view::npos) return false;
+    const std::string_view word = text.substr(0, end);
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), numbers[i]);
+    if (error != std::errc{} || stop != word.data() + word.size() || !std::isfinite(numbers[i])) return false;
+    text.remove_prefix(std::min(text.size(), end + 1));
   }
-  return mapped;
+  return true;
 }
 
-template <typename Write>
-Status write_file(const std::filesystem::path& file, Write write) {
-  std::ofstream stream(file, std::ios::binary);
-  write([&](std::span<const std::byte> bytes) {
-    stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  });
-  stream.close();
-  if (!stream) return failure(Fault::kDiskWrite, "{}", file.string());
+Result<Questions> read_questions(const MapCommandOptions& options) {
+  Questions questions;
+  if (!options.at.empty()) {
+    std::array<double, 3> p{};
+    if (!read_numbers(options.at, p) || Eigen::Vector3d(p.data()).cwiseAbs().maxCoeff() > kPlaceMax_m)
+      return failure(Fault::kUsage, "--at {}: three numbers X,Y,Z in metres", options.at);
+    questions.place_m = Eigen::Vector3d(p.data());
+  }
+  for (const std::string& move : options.moves) {
+    std::array<double, 4> n{};
+    if (!read_numbers(move, n) || n[0] != std::floor(n[0]) || std::abs(n[0]) > 1e9)
+      return failure(Fault::kUsage, "--move {}: an object's number and metres, ID,dx,dy,dz", move);
+    questions.moves.push_back({static_cast<int>(n[0]), {n[1], n[2], n[3]}});
+  }
+  return questions;
+}
+
+Status check_options(const MapCommandOptions& options) {
+  if (options.dataset.empty() == options.from.empty())
+    return failure(Fault::kUsage, "either --dataset DIR or --from FILE");
+  if (!(options.resolution_m >= kResolutionMin_m && options.resolution_m <= kResolutionMax_m))
+    return failure(Fault::kUsage, "--resolution {}: must be {} to {} m", options.resolution_m, kResolutionMin_m,
+                   kResolutionMax_m);
+  if (!(options.range_max_m > 0 && options.range_max_m <= kRangeLimit_m))
+    return failure(Fault::kUsage, "--max-range {}: must be above 0 and at most {} m", options.range_max_m,
+                   kRangeLimit_m);
+  if (options.depth < 1 || options.depth > 16)
+    return failure(Fault::kUsage, "--depth {}: must be 1 to 16", options.depth);
   return {};
 }
 
-Status write_map_files(const VoxelMap& map, const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return failure(Fault::kDiskWrite, "{}: {}", folder.string(), error.message());
-  Status status = write_file(folder / "collision_map.bt",
-                             [&](ByteSink sink) { write_bt(map, collision_class, kOctreeDepth, sink); });
-  if (status) status = write_file(folder / "map.ot", [&](ByteSink sink) { write_ot(map, kOctreeDepth, sink); });
-  if (status) status = write_file(folder / "map.ply", [&](ByteSink sink) { write_ply(map, false, sink); });
-  return status;
+void narrate(const FrameOutcome& frame) {
+  if (!frame.refused.empty()) return fmt::print(stderr, "refused: {}\n", frame.refused);
+  fmt::print(stderr, "{}: {} pixels used, {} voxels discovered; {} free, {} occupied\n", frame.image,
+             frame.inserted.pixels_used, frame.inserted.change.voxels_discovered, frame.voxels.free,
+             frame.voxels.occupied);
 }
 
-void print_result(const MapCommandOptions& options, const MappingDataset& dataset, const Mapped& mapped) {
-  const GridGeometry& g = mapped.map.geometry();
-  const VoxelCounts counts = mapped.map.counts();
-  if (!options.json) {
-    fmt::print("{} frames at {} m: {} voxels free, {} occupied, {} unknown\n", dataset.frames.size(),
-               options.resolution_m, counts.free, counts.occupied, counts.unknown);
-    return;
+void narrate(std::string_view what, const std::vector<RefusedLine>& refused) {
+  for (std::size_t i = 0; i < std::min(kRefusedNarrated, refused.size()); ++i)
+    fmt::print(stderr, "refused: {}\n", refused[i].reason);
+  if (refused.size() > kRefusedNarrated)
+    fmt::print(stderr, "refused: {} more {}\n", refused.size() - kRefusedNarrated, what);
+}
+
+Result<Answers> from_dataset(const MapCommandOptions& options, const Questions& questions) {
+  Result<MappingDataset> dataset =
+      read_mapping_dataset(options.dataset, options.sort ? FrameOrder::kByStamp : FrameOrder::kAsRecorded);
+  if (!dataset) return std::unexpected(dataset.error());
+  narrate("poses", dataset->refused_poses);
+  narrate("frames", dataset->refused);
+  if (dataset->poses_were_sorted) fmt::print(stderr, "groundtruth.txt is not in the order of time: sorted\n");
+  const auto report = [](const FrameOutcome& frame) { narrate(frame); };
+  Result<DatasetMap> mapped =
+      map_dataset(*dataset, {options.resolution_m, options.range_max_m, questions.place_m}, report);
+  if (!mapped) return std::unexpected(mapped.error());
+  const std::size_t refused = mapped->refused();
+  Answers answers{std::move(mapped->map), std::move(*dataset), std::move(mapped->frames), refused, {}, {}, {}, {}};
+  if (questions.place_m) answers.seen = mapped->place;
+  return answers;
+}
+
+Result<Answers> from_file(const MapCommandOptions& options) {
+  Result<VoxelMap> map = read_map_file(options.from, kOfflineVoxelsMax);
+  if (!map) return std::unexpected(map.error());
+  return Answers{std::move(*map), {}, {}, 0, {}, {}, {}, {}};
+}
+
+Status answer(const MapCommandOptions& options, const Questions& questions, Answers& answers) {
+  if (options.objects || questions.place_m || !questions.moves.empty())
+    answers.objects = find_objects(answers.map, collision_class);
+  if (!questions.moves.empty()) {
+    Result<VoxelMap> moved = move_objects(answers.map, *answers.objects, questions.moves, kOfflineVoxelsMax);
+    if (!moved) return std::unexpected(moved.error());
+    answers.map = std::move(*moved);
+    answers.objects = find_objects(answers.map, collision_class);
   }
-  const Eigen::Vector3d low_m = g.first.cast<double>() * g.resolution_m;
-  const Eigen::Vector3d high_m = (g.first + g.size).cast<double>() * g.resolution_m;
-  const nlohmann::ordered_json result = {
-      {"resolution_m", g.resolution_m},
-      {"range_max_m", options.range_max_m},
-      {"extents_m", {{"low", {low_m.x(), low_m.y(), low_m.z()}}, {"high", {high_m.x(), high_m.y(), high_m.z()}}}},
-      {"frames", mapped.frames},
-      {"frames_without_pose", dataset.frames_without_pose},
-      {"voxels", to_json(counts)}};
-  fmt::print("{}\n", result.dump(2));
+  if (questions.place_m) {
+    answers.place = look_up(answers.map, *questions.place_m, &*answers.objects);
+    answers.place->seen = answers.seen;
+  }
+  if (!options.prior.empty()) {
+    const Result<MapInGrid> prior = read_map_file_into(options.prior, answers.map.geometry());
+    if (!prior) return std::unexpected(prior.error());
+    if (prior->voxels_outside > 0)
+      fmt::print(stderr, "{}: {} known voxels lie outside this map\n", options.prior.string(), prior->voxels_outside);
+    answers.change = compare_maps(prior->map, answers.map);
+  }
+  return {};
+}
+
+Status write_files(const MapCommandOptions& options, const Answers& answers) {
+  const std::string folder = options.out.string();
+  Status status = write_map_files(folder, answers.map, options.depth);
+  if (status && answers.dataset) status = write_file_atomically(folder + "/frames.csv", frames_csv(answers.frames));
+  if (!status || !options.objects) return status;
+  const MapPicture picture = object_picture(answers.map, *answers.objects, kPictureAzimuth_rad, "objects");
+  return write_file_atomically(folder + "/objects.png", encode_png(picture.picture));
+}
+
+Json frames_refused_json(const std::vector<FrameOutcome>& frames) {
+  Json refused = Json::array();
+  for (const FrameOutcome& frame : frames) {
+    if (frame.refused.empty()) continue;
+    const Json stamp = std::isfinite(frame.stamp_s) ? Json(frame.stamp_s) : Json(nullptr);
+    refused.push_back({{"line", frame.line}, {"stamp_s", stamp}, {"image", frame.image}, {"reason", frame.refused}});
+  }
+  return refused;
+}
+
+Json poses_refused_json(const std::vector<RefusedLine>& poses) {
+  Json refused = Json::array();
+  for (const RefusedLine& pose : poses) refused.push_back({{"line", pose.line}, {"reason", pose.reason}});
+  return refused;
+}
+
+Json result_json(const MapCommandOptions& options, const Answers& answers) {
+  Json result = {{"resolution_m", answers.map.geometry().resolution_m}};
+  if (answers.dataset) result["range_max_m"] = options.range_max_m;
+  result["extents_m"] = extents_json(answers.map.geometry());
+  if (answers.dataset) {
+    Json& frames = result["frames"] = Json::array();
+    for (const FrameOutcome& frame : answers.frames)
+      if (frame.refused.empty()) frames.push_back(frame_json(frame));
+    result["frames_without_pose"] = answers.dataset->frames_without_pose;
+    result["frames_refused"] = answers.frames_refused;
+    result["refused"] = frames_refused_json(answers.frames);
+    result["poses_refused"] = poses_refused_json(answers.dataset->refused_poses);
+    result["association_s"] = kPoseAssociation_s;
+    result["interpolation_max_s"] = kPoseInterpolation_s;
+  }
+  result["voxels"] = counts_json(answers.map.counts());
+  if (options.objects) {
+    result["objects"] = objects_json(*answers.objects);
+    result["specks"] = answers.objects->specks;
+  }
+  if (answers.place) result["place"] = place_json(*answers.place);
+  if (answers.change) result["prior"] = change_json(*answers.change);
+  return result;
+}
+
+void print_text(const MapCommandOptions& options, const Answers& answers) {
+  const VoxelCounts counts = answers.map.counts();
+  if (answers.dataset)
+    fmt::print("{} frames, {} refused, at ", answers.frames.size() - answers.frames_refused, answers.frames_refused);
+  fmt::print("{} m: {} voxels free, {} occupied, {} unknown\n", answers.map.geometry().resolution_m, counts.free,
+             counts.occupied, counts.unknown);
+  if (options.objects) fmt::print("{}", objects_text(*answers.objects));
+  if (answers.place) fmt::print("{}", place_text(*answers.place));
+  if (answers.change) {
+    const MapChange& c = *answers.change;
+    fmt::print("against the earlier map: {} newly occupied, {} gone, {} still occupied, {} of its occupied not seen\n",
+               c.newly_occupied, c.gone, c.still_occupied, c.unseen_occupied);
+  }
 }
 
 int report(const Error& error) {
@@ -149,29 +224,21 @@ int report(const Error& error) {
   return error.fault == Fault::kUsage ? kExitUsage : kExitData;
 }
 
-Status check_options(const MapCommandOptions& options) {
-  if (!(options.resolution_m >= kResolutionMin_m && options.resolution_m <= kResolutionMax_m))
-    return failure(Fault::kUsage, "--resolution {}: must be {} to {} m", options.resolution_m, kResolutionMin_m,
-                   kResolutionMax_m);
-  if (!(options.range_max_m > 0 && options.range_max_m <= kRangeLimit_m))
-    return failure(Fault::kUsage, "--max-range {}: must be above 0 and at most {} m", options.range_max_m,
-                   kRangeLimit_m);
-  return {};
-}
-
 }  // namespace
 
 int run_map_command(const MapCommandOptions& options) {
   if (const Status status = check_options(options); !status) return report(status.error());
-  const Result<MappingDataset> dataset = read_mapping_dataset(options.dataset);
-  if (!dataset) return report(dataset.error());
-  if (dataset->frames_without_pose > 0)
-    fmt::print(stderr, "{} frames have no pose and are left out\n", dataset->frames_without_pose);
-  const Result<Mapped> mapped = map_dataset(*dataset, options);
-  if (!mapped) return report(mapped.error());
+  const Result<Questions> questions = read_questions(options);
+  if (!questions) return report(questions.error());
+  Result<Answers> answers = options.from.empty() ? from_dataset(options, *questions) : from_file(options);
+  if (!answers) return report(answers.error());
+  if (const Status status = answer(options, *questions, *answers); !status) return report(status.error());
   if (!options.out.empty())
-    if (const Status status = write_map_files(mapped->map, options.out); !status) return report(status.error());
-  print_result(options, *dataset, *mapped);
+    if (const Status status = write_files(options, *answers); !status) return report(status.error());
+  if (options.json)
+    fmt::print("{}\n", result_json(options, *answers).dump(2));
+  else
+    print_text(options, *answers);
   return kExitDone;
 }
 

@@ -111,6 +111,7 @@ struct Config {
     std::array<double, 3> high_m{1.5, 1.5, 1.5};
     double free_max_age_s = 600;
     std::string holes = "ignore";
+    std::string prior = "none";  ///< .bt or .ot of an earlier map of the cell; none: there is none
     bool operator==(const Map&) const = default;
   } map;
 

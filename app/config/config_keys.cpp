@@ -232,6 +232,13 @@ void add_map_keys(Keys& keys, Config& c) {
                   {},
                   "free space not seen for so long counts as unknown for motion"});
   keys.push_back({"map.holes", &c.map.holes, 0, 0, kHoles, "what a pixel without a return says: nothing"});
+  keys.push_back({"map.prior",
+                  &c.map.prior,
+                  0,
+                  0,
+                  {},
+                  "earlier map of the cell, .bt or .ot: hints where to look first, and nothing is known by it; none: "
+                  "there is none"});
   keys.push_back({"explore.views_max", &c.explore.views_max, 1, 500, {}, "views to take at most"});
   keys.push_back({"explore.candidates", &c.explore.candidates, 10, 20000, {}, "configurations scored for each view"});
   keys.push_back({"explore.certificate_samples",

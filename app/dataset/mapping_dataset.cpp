@@ -1,8 +1,10 @@
 #include "app/dataset/mapping_dataset.hpp"
 
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -15,9 +17,7 @@
 namespace firstlook {
 namespace {
 
-constexpr double kAssociation_s = 0.02;        // depth frames and poses this near belong together
-constexpr double kInterpolationMax_s = 0.2;    // a pose is interpolated between two that are no farther apart
-constexpr double kQuaternionTolerance = 1e-2;  // TUM's files round to four decimals
+constexpr double kQuaternionTolerance = 1e-2;               // TUM's files round to four decimals
 constexpr double kDepthScaleMin = 1, kDepthScaleMax = 1e6;  // metres to micrometres
 
 // A line of a file that is neither empty nor a comment, cut at white space.
@@ -27,9 +27,11 @@ struct Line {
 };
 
 struct StampedPose {
+  int line = 0;
   double stamp_s = 0;
-  Eigen::Quaterniond rotation;
-  Eigen::Vector3d position_m;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  std::string fault;  // not empty: at this time the camera was lost
 };
 
 Result<std::vector<Line>> read_lines(const std::filesystem::path& file) {
@@ -62,89 +64,156 @@ std::optional<double> to_number(const std::string& word) {
   return value;
 }
 
-// The numbers of a line's first `count` words.
-Result<std::vector<double>> to_numbers(const std::filesystem::path& file, const Line& line, std::size_t count) {
-  std::vector<double> numbers;
-  for (std::size_t i = 0; i < count; ++i) {
+// What is wrong with the numbers of a line, or nothing.
+std::string read_numbers(const Line& line, std::span<double> numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
     const std::optional<double> number = to_number(line.words[i]);
-    if (!number)
-      return failure(Fault::kDataMalformed, "{}:{}: '{}' is not a finite number", file.filename().string(), line.number,
-                     line.words[i]);
-    numbers.push_back(*number);
+    if (!number) return fmt::format("'{}' is not a finite number", line.words[i]);
+    numbers[i] = *number;
   }
-  return numbers;
+  return {};
 }
 
-Result<std::vector<StampedPose>> read_poses(const std::filesystem::path& file) {
+StampedPose read_pose(const Line& line) {
+  StampedPose pose;
+  pose.line = line.number;
+  pose.stamp_s = to_number(line.words[0]).value_or(std::nan(""));
+  if (line.words.size() != 8) {
+    pose.fault = fmt::format("{} columns instead of 'timestamp tx ty tz qx qy qz qw'", line.words.size());
+    return pose;
+  }
+  std::array<double, 8> n{};
+  pose.fault = read_numbers(line, n);
+  if (!pose.fault.empty()) return pose;
+  const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
+  if (std::abs(rotation.norm() - 1) > kQuaternionTolerance) {
+    pose.fault = fmt::format("quaternion of length {:.4f} instead of 1", rotation.norm());
+    return pose;
+  }
+  pose.rotation = rotation.normalized();
+  pose.position_m = {n[1], n[2], n[3]};
+  return pose;
+}
+
+// In the order of time, faults among them; those whose time is not known are only noted.
+Result<std::vector<StampedPose>> read_poses(const std::filesystem::path& file, MappingDataset& dataset) {
   const Result<std::vector<Line>> lines = read_lines(file);
   if (!lines) return std::unexpected(lines.error());
-  const std::string name = file.filename().string();
   std::vector<StampedPose> poses;
+  const auto refuse = [&dataset](const StampedPose& pose, const std::string& reason) {
+    dataset.refused_poses.push_back(
+        {pose.line, pose.stamp_s, {}, fmt::format("groundtruth.txt:{}: {}", pose.line, reason)});
+  };
+  std::size_t good = 0;
   for (const Line& line : *lines) {
-    if (line.words.size() != 8)
-      return failure(Fault::kDataMalformed, "{}:{}: {} columns instead of 'timestamp tx ty tz qx qy qz qw'", name,
-                     line.number, line.words.size());
-    const Result<std::vector<double>> n = to_numbers(file, line, 8);
-    if (!n) return std::unexpected(n.error());
-    const Eigen::Quaterniond rotation((*n)[7], (*n)[4], (*n)[5], (*n)[6]);
-    if (std::abs(rotation.norm() - 1) > kQuaternionTolerance)
-      return failure(Fault::kDataMalformed, "{}:{}: quaternion of length {:.4f} instead of 1", name, line.number,
-                     rotation.norm());
-    if (!poses.empty() && (*n)[0] < poses.back().stamp_s)
-      return failure(Fault::kDataMalformed, "{}:{}: time stamps must ascend", name, line.number);
-    poses.push_back({(*n)[0], rotation.normalized(), {(*n)[1], (*n)[2], (*n)[3]}});
+    StampedPose pose = read_pose(line);
+    if (!pose.fault.empty()) refuse(pose, pose.fault);
+    good += pose.fault.empty() ? 1 : 0;
+    if (std::isfinite(pose.stamp_s)) poses.push_back(std::move(pose));
   }
-  if (poses.empty()) return failure(Fault::kDataMalformed, "{}: no poses", name);
-  return poses;
+  if (good == 0)
+    return failure(Fault::kDataMalformed, "{}",
+                   lines->empty() ? "groundtruth.txt: no poses" : dataset.refused_poses.front().reason);
+  const auto by_stamp = [](const StampedPose& a, const StampedPose& b) { return a.stamp_s < b.stamp_s; };
+  dataset.poses_were_sorted = !std::ranges::is_sorted(poses, by_stamp);
+  std::ranges::stable_sort(poses, by_stamp);
+  std::vector<StampedPose> kept;
+  for (StampedPose& pose : poses) {
+    const bool again = !kept.empty() && kept.back().stamp_s == pose.stamp_s;
+    if (!again)
+      kept.push_back(std::move(pose));
+    else if (pose.fault.empty())
+      refuse(pose, fmt::format("the stamp of line {} again", kept.back().line));
+  }
+  return kept;
+}
+
+using PoseOrReason = std::expected<Transform<Base, Depth>, std::string>;
+
+PoseOrReason take(const StampedPose& pose) {
+  if (!pose.fault.empty()) return std::unexpected(fmt::format("groundtruth.txt:{}: {}", pose.line, pose.fault));
+  return Transform<Base, Depth>(pose.rotation, pose.position_m);
 }
 
 // The pose at a time: interpolated between near neighbours, else the nearest within the association time.
-std::optional<Transform<Base, Depth>> pose_at(std::span<const StampedPose> poses, double stamp_s) {
+PoseOrReason pose_at(std::span<const StampedPose> poses, double stamp_s) {
   const auto after = std::lower_bound(poses.begin(), poses.end(), stamp_s,
                                       [](const StampedPose& pose, double stamp) { return pose.stamp_s < stamp; });
-  const auto take = [](const StampedPose& pose) { return Transform<Base, Depth>(pose.rotation, pose.position_m); };
   if (after != poses.end() && after->stamp_s == stamp_s) return take(*after);
   const StampedPose* next = after != poses.end() ? &*after : nullptr;
   const StampedPose* previous = after != poses.begin() ? &*(after - 1) : nullptr;
-  if (next != nullptr && previous != nullptr && next->stamp_s - previous->stamp_s <= kInterpolationMax_s) {
-    const double t = (stamp_s - previous->stamp_s) / (next->stamp_s - previous->stamp_s);
+  const bool between = next != nullptr && previous != nullptr;
+  const double gap_s = between ? next->stamp_s - previous->stamp_s : 0;
+  if (between && gap_s <= kPoseInterpolation_s && next->fault.empty() && previous->fault.empty()) {
+    const double t = (stamp_s - previous->stamp_s) / gap_s;
     return Transform<Base, Depth>(previous->rotation.slerp(t, next->rotation),
                                   previous->position_m + t * (next->position_m - previous->position_m));
   }
-  if (previous != nullptr && stamp_s - previous->stamp_s <= kAssociation_s &&
-      (next == nullptr || stamp_s - previous->stamp_s <= next->stamp_s - stamp_s))
-    return take(*previous);
-  if (next != nullptr && next->stamp_s - stamp_s <= kAssociation_s) return take(*next);
-  return std::nullopt;
+  const bool next_is_nearer =
+      next != nullptr && (previous == nullptr || next->stamp_s - stamp_s < stamp_s - previous->stamp_s);
+  const StampedPose& nearest = next_is_nearer ? *next : *previous;
+  if (std::abs(nearest.stamp_s - stamp_s) <= kPoseAssociation_s) return take(nearest);
+  std::string reason = fmt::format("groundtruth.txt: no pose within {} s", kPoseAssociation_s);
+  if (between) {
+    const StampedPose& lost = previous->fault.empty() ? *next : *previous;
+    reason += lost.fault.empty()
+                  ? fmt::format(", and lines {} and {} around it are {:.3g} s apart", previous->line, next->line, gap_s)
+                  : fmt::format(", and line {} beside it is no pose: {}", lost.line, lost.fault);
+  }
+  return std::unexpected(reason);
 }
 
-Status read_frames(const std::filesystem::path& folder, std::span<const StampedPose> poses, MappingDataset& dataset) {
+// A line of depth.txt as far as it can be read.
+struct FrameLine {
+  int number = 0;
+  double stamp_s = 0;
+  std::string image;
+  std::string fault;
+};
+
+FrameLine read_frame(const Line& line, const std::filesystem::path& folder) {
+  FrameLine frame{line.number, to_number(line.words[0]).value_or(std::nan("")), {}, {}};
+  if (line.words.size() > 1) frame.image = line.words[1];
+  if (line.words.size() != 2)
+    frame.fault = fmt::format("{} columns instead of 'timestamp filename'", line.words.size());
+  else if (!std::isfinite(frame.stamp_s))
+    frame.fault = fmt::format("'{}' is not a finite number", line.words[0]);
+  else if (frame.stamp_s < 0)
+    frame.fault = "negative time stamp";
+  else if (!std::filesystem::is_regular_file(folder / frame.image))
+    frame.fault = fmt::format("{}: no such file", frame.image);
+  return frame;
+}
+
+std::string order_fault(const FrameLine& frame, const MappingFrame& last) {
+  if (frame.stamp_s > last.stamp_s) return {};
+  if (frame.stamp_s == last.stamp_s) return fmt::format("the stamp of line {} again", last.line);
+  return fmt::format("time stamps must ascend, and line {} has {:.6f} s (--sort sorts them)", last.line, last.stamp_s);
+}
+
+Status read_frames(const std::filesystem::path& folder, std::span<const StampedPose> poses, FrameOrder order,
+                   MappingDataset& dataset) {
   const Result<std::vector<Line>> lines = read_lines(folder / "depth.txt");
   if (!lines) return std::unexpected(lines.error());
-  double last_s = -1;
-  for (const Line& line : *lines) {
-    if (line.words.size() != 2)
-      return failure(Fault::kDataMalformed, "depth.txt:{}: {} columns instead of 'timestamp filename'", line.number,
-                     line.words.size());
-    const Result<std::vector<double>> stamp = to_numbers("depth.txt", line, 1);
-    if (!stamp) return std::unexpected(stamp.error());
-    const double stamp_s = stamp->front();
-    if (stamp_s < 0) return failure(Fault::kDataMalformed, "depth.txt:{}: negative time stamp", line.number);
-    if (stamp_s <= last_s) return failure(Fault::kDataMalformed, "depth.txt:{}: time stamps must ascend", line.number);
-    last_s = stamp_s;
-    if (!std::filesystem::is_regular_file(folder / line.words[1]))
-      return failure(Fault::kDataMissing, "depth.txt:{}: {}: no such file", line.number, line.words[1]);
-    const std::optional<Transform<Base, Depth>> pose = pose_at(poses, stamp_s);
-    if (!pose) {
-      ++dataset.frames_without_pose;
+  if (lines->empty()) return failure(Fault::kDataMalformed, "depth.txt: no frames");
+  std::vector<FrameLine> frames;
+  for (const Line& line : *lines) frames.push_back(read_frame(line, folder));
+  if (order == FrameOrder::kByStamp)
+    std::ranges::stable_sort(frames, {}, [](const FrameLine& f) { return std::isfinite(f.stamp_s) ? f.stamp_s : -1; });
+  for (FrameLine& frame : frames) {
+    if (frame.fault.empty() && !dataset.frames.empty()) frame.fault = order_fault(frame, dataset.frames.back());
+    const PoseOrReason pose = frame.fault.empty() ? pose_at(poses, frame.stamp_s) : std::unexpected(frame.fault);
+    if (pose) {
+      dataset.frames.push_back({frame.number, frame.stamp_s, folder / frame.image, *pose});
       continue;
     }
-    dataset.frames.push_back({stamp_s, folder / line.words[1], *pose});
+    dataset.frames_without_pose += frame.fault.empty() ? 1 : 0;
+    dataset.refused.push_back(
+        {frame.number, frame.stamp_s, frame.image, fmt::format("depth.txt:{}: {}", frame.number, pose.error())});
   }
-  if (lines->empty()) return failure(Fault::kDataMalformed, "depth.txt: no frames");
+  std::ranges::stable_sort(dataset.refused, {}, &RefusedLine::line);
   if (dataset.frames.empty())
-    return failure(Fault::kDataMalformed, "groundtruth.txt: no pose within {} s of any frame of depth.txt",
-                   kAssociation_s);
+    return failure(Fault::kDataMalformed, "no frame can be used; the first: {}", dataset.refused.front().reason);
   return {};
 }
 
@@ -165,19 +234,23 @@ Result<double> read_depth_scale(const std::filesystem::path& file) {
 
 }  // namespace
 
-Result<MappingDataset> read_mapping_dataset(const std::filesystem::path& folder) {
+Result<MappingDataset> read_mapping_dataset(const std::filesystem::path& folder, FrameOrder order) {
   if (!std::filesystem::is_directory(folder))
     return failure(Fault::kDataMissing, "{}: no such folder", folder.string());
   MappingDataset dataset;
+  if (!std::filesystem::exists(folder / "camera_info.yaml"))
+    return failure(Fault::kDataMissing,
+                   "{}: no such file: it gives the depth camera's intrinsics as ROS writes them, and depth_scale",
+                   (folder / "camera_info.yaml").string());
   const Result<CameraIntrinsics> intrinsics = read_camera_info(folder / "camera_info.yaml");
   if (!intrinsics) return std::unexpected(intrinsics.error());
   dataset.intrinsics = *intrinsics;
   const Result<double> scale = read_depth_scale(folder / "camera_info.yaml");
   if (!scale) return std::unexpected(scale.error());
   dataset.units_per_m = *scale;
-  const Result<std::vector<StampedPose>> poses = read_poses(folder / "groundtruth.txt");
+  const Result<std::vector<StampedPose>> poses = read_poses(folder / "groundtruth.txt", dataset);
   if (!poses) return std::unexpected(poses.error());
-  if (Status status = read_frames(folder, *poses, dataset); !status) return std::unexpected(status.error());
+  if (Status status = read_frames(folder, *poses, order, dataset); !status) return std::unexpected(status.error());
   return dataset;
 }
 

@@ -15,7 +15,10 @@ namespace {
 
 ViewList list_of(const Result<Turns>& turns) {
   ViewList list;
-  if (!turns) return list;
+  if (!turns) {
+    list.fault = turns.error().fault;
+    return list;
+  }
   for (const JointVector& q : *turns) {
     if (!list.views_rad.full()) list.views_rad.push_back(q);
   }

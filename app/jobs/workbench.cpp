@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algorithms/mapping/reach_zone.hpp"
+#include "app/dataset/map_file.hpp"
 
 namespace firstlook {
 namespace {
@@ -49,14 +50,25 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
   }
   const GridGeometry geometry =
       GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
-  const std::size_t needed = VoxelMap::required_bytes(geometry) + 3 * geometry.count();
+  const bool has_prior = config.map.prior != "none";
+  const std::size_t prior_bytes =
+      has_prior ? VoxelMap::required_bytes(geometry, VoxelMap::Planes::kLogOddsOnly) + GainModel::prior_bytes(geometry)
+                : 0;
+  const std::size_t needed = VoxelMap::required_bytes(geometry) + 3 * geometry.count() + prior_bytes;
   if (needed > memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) {
     return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m need {:.1f} MiB, the budget holds {:.1f} MiB",
                    geometry.size.x(), geometry.size.y(), geometry.size.z(), geometry.resolution_m,
                    static_cast<double>(needed) / memory::kMiB,
                    static_cast<double>(memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) / memory::kMiB);
   }
+  std::optional<VoxelMap> prior;
+  if (has_prior) {
+    auto read = read_map_file_into(config.map.prior, geometry);
+    if (!read) return failure(read.error().fault, "map.prior: {}", read.error().detail());
+    prior = std::move(read->map);
+  }
   auto bench = std::unique_ptr<Workbench>(new Workbench(config, facts, *arm, color, depth, workers, geometry));
+  if (prior) bench->take_prior(std::move(*prior));
   if (const Status taken = bench->take_memory(); !taken) return std::unexpected(taken.error());
   return bench;
 }
@@ -114,7 +126,8 @@ Status Workbench::take_memory() {
   const std::size_t way_sight = sizeof(WaySight) + decltype(WayArguments::joints)::capacity() * sizeof(JointSample) +
                                 static_cast<std::size_t>(board_.corners()) * point;
   for (const auto& [pool, bytes] : {
-           std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g) + 3 * g.count()},
+           std::pair{memory::Pool::kVoxelPlanes,
+                     VoxelMap::required_bytes(g) + 3 * g.count() + (prior_ ? 2 * g.count() : 0)},
            std::pair{memory::Pool::kDistanceField,
                      2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
@@ -264,7 +277,18 @@ ViewContext Workbench::context(const Clearance& clearance) const {
           zone_,
           hand_eye_->flange_T_camera * camera_T_depth(),
           last_stamp_s_ + kFreshShareOfAge * max_age_s,
-          max_age_s};
+          max_age_s,
+          prior_ ? &*prior_ : nullptr};
+}
+
+void Workbench::take_prior(VoxelMap prior) {
+  prior_ = std::move(prior);
+  chooser_.gain().allow_prior();
+}
+
+std::optional<MapChange> Workbench::change_since_prior() const {
+  if (!prior_) return std::nullopt;
+  return compare_maps(*prior_, map_, zone_);
 }
 
 }  // namespace firstlook

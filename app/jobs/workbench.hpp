@@ -13,6 +13,7 @@
 #include "algorithms/kinematics/speed.hpp"
 #include "algorithms/mapping/distance_field.hpp"
 #include "algorithms/mapping/insertion.hpp"
+#include "algorithms/mapping/map_change.hpp"
 #include "algorithms/motion/body.hpp"
 #include "algorithms/motion/clearance.hpp"
 #include "algorithms/motion/planner.hpp"
@@ -117,6 +118,8 @@ class Workbench {
   /// The classes of the map as the sweep left it; all unknown when the sweep did not end.
   [[nodiscard]] VoxelMap map_after_sweep() const;
   [[nodiscard]] std::span<const std::uint8_t> zone() const { return zone_; }
+  /// What became of the prior map in the reach zone; empty without one.
+  [[nodiscard]] std::optional<MapChange> change_since_prior() const;
   [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
   [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
   [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
@@ -146,6 +149,7 @@ class Workbench {
   };
   [[nodiscard]] std::array<Pace, 3> mapping_paces() const;
   void revoke_zone();
+  void take_prior(VoxelMap prior);
   void note_trail(const Path& path);
   [[nodiscard]] Route route_of(const Path& path, const Body& body, const SpeedLimits& limits) const;
   [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
@@ -241,6 +245,7 @@ class Workbench {
   bool any_revoked_ = false;
   FreeSpace mapping_space_;  ///< as rebuilt last
   ViewChooser chooser_;
+  std::optional<VoxelMap> prior_;  ///< a hint for views; never for motion
   FixedVector<JointVector, 512> trail_;
   std::optional<SweepProgress> sweep_;
   std::vector<std::int8_t> swept_log_odds_;  ///< when the sweep ended

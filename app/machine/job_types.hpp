@@ -100,9 +100,10 @@ struct FromHere {
 
 struct ViewList {  ///< kLocateViews, kIdentifyMotions (outermost joint first)
   FixedVector<JointVector, kViewListMax> views_rad;
+  Fault fault = Fault::kNothingReachable;  ///< why it is empty
   template <typename Archive>
   void fields(Archive& a) {
-    a(views_rad);
+    a(views_rad, fault);
   }
 };
 

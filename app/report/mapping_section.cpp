@@ -37,6 +37,36 @@ std::string counts_table(const MappingRecord& m) {
   return table.html();
 }
 
+std::string objects_table(const MapObjects& objects) {
+  if (objects.objects.empty()) return {};
+  HtmlTable table({"object", "shape", "voxels", "size, m", "centre in base, m"}, 2);
+  for (const MapObject& o : objects.objects) {
+    const Eigen::Vector3d &s = o.box.size_m, &c = o.box.center_m;
+    table.row({fmt::format("{}", o.id), std::string(to_string(o.shape)) + (o.bounds_room ? ", bounds the room" : ""),
+               grouped(o.voxels), fmt::format("{:.2f} x {:.2f} x {:.2f}", s.x(), s.y(), s.z()),
+               fmt::format("{:.2f}, {:.2f}, {:.2f}", c.x(), c.y(), c.z())});
+  }
+  return "<h3>The objects in their boxes</h3>\n" + table.html() +
+         fmt::format(
+             "<p class=\"hint\">Connected occupied voxels in their boxes; {} more in pieces of fewer than {}."
+             "</p>\n",
+             grouped(objects.specks), kObjectVoxelsMin);
+}
+
+std::string prior_table(const MapChange& change, double resolution_m) {
+  HtmlTable table({"against the earlier map, in the reach of the arm", "voxels", "litres"}, 1);
+  const auto row = [&](std::string text, std::size_t voxels) {
+    table.row({std::move(text), grouped(voxels), litres(voxels, resolution_m)});
+  };
+  row("newly occupied: it was free", change.newly_occupied);
+  row("gone: it was occupied", change.gone);
+  row("still occupied", change.still_occupied);
+  row("was occupied, not seen this time: unknown", change.unseen_occupied);
+  row("was free, not seen this time: unknown", change.unseen_free);
+  row("known for the first time", change.first_known);
+  return "<h3>What changed</h3>\n" + table.html();
+}
+
 constexpr std::string_view kMapLegend =
     "<p class=\"hint\"><span class=\"dot sweep\"></span> views of the sweep, <span class=\"dot explore\"></span> of "
     "the "
@@ -98,6 +128,8 @@ std::string map_section(const RunRecord& record) {
   body +=
       "<h3>In the reach of the arm, view by view</h3>\n<div class=\"figure\">\n" + voxel_chart(m.views) + "</div>\n";
   body += "<h3>At the end</h3>\n" + counts_table(m);
+  if (m.since_prior) body += prior_table(*m.since_prior, m.resolution_m);
+  body += objects_table(m.objects);
   body += fmt::format(
       "<p class=\"hint\">Voxels of {:.0f} mm. {} depth frames went into the map; {} were dropped because their pose or "
       "stamp could not be trusted.</p>\n",

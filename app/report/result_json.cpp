@@ -4,6 +4,7 @@
 
 #include "app/report/alignment_json.hpp"
 #include "app/report/hand_eye_json.hpp"
+#include "app/report/map_json.hpp"
 #include "app/report/ros_files.hpp"
 #include "app/report/settling.hpp"
 
@@ -25,10 +26,6 @@ Json phases_json(const RunRecord& record) {
   return phases;
 }
 
-Json counts_json(const VoxelCounts& counts) {
-  return {{"unknown", counts.unknown}, {"free", counts.free}, {"occupied", counts.occupied}};
-}
-
 Json mapping_json(const MappingRecord& mapping) {
   Json remaining = Json::array();
   for (const RemainingRecord& cluster : mapping.remaining) {
@@ -41,7 +38,9 @@ Json mapping_json(const MappingRecord& mapping) {
           {"voxels", counts_json(mapping.voxels)},
           {"grid_voxels", counts_json(mapping.grid_voxels)},
           {"frames", {{"integrated", mapping.frames_integrated}, {"dropped", mapping.frames_dropped}}},
-          {"remaining", remaining}};
+          {"remaining", remaining},
+          {"prior", mapping.since_prior ? change_json(*mapping.since_prior) : Json(nullptr)},
+          {"objects", objects_json(mapping.objects)}};
 }
 
 Json safety_json(const SafetyRecord& safety) {
@@ -104,6 +103,7 @@ std::string result_json(const RunRecord& record) {
   Json json;
   json["outcome"] = name_of(record.outcome);
   json["reason"] = record.reason;
+  json["remedy"] = record.remedy.empty() ? Json() : Json(record.remedy);
   json["seed"] = record.seed;
   json["cell"] = cell_name(record.cell);
   json["phases"] = phases_json(record);

@@ -14,6 +14,8 @@
 #include "algorithms/calibration/time_offset.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/verification.hpp"
+#include "algorithms/mapping/map_change.hpp"
+#include "algorithms/mapping/objects.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 #include "algorithms/motion/clearance.hpp"
 #include "app/dataset/hand_eye_file.hpp"
@@ -130,6 +132,8 @@ struct MappingRecord {
   VoxelCounts voxels;       ///< of the reach zone at the end, as in the last of `views`
   VoxelCounts grid_voxels;  ///< of the whole grid: what the map files hold
   std::vector<RemainingRecord> remaining;
+  std::optional<MapChange> since_prior;  ///< in the reach zone; empty when no earlier map was given
+  MapObjects objects;                    ///< of the whole grid, as collision_map.bt has it; without the voxels' ids
   std::uint64_t frames_integrated = 0;
   std::uint64_t frames_dropped = 0;
 };
@@ -267,6 +271,7 @@ struct VerifiedCalibration {
 struct RunRecord {
   Outcome outcome = Outcome::kFaulted;
   std::string reason;  ///< one sentence; for `done`, too
+  std::string remedy;  ///< what to do about it; empty when nothing is to be done
   std::int64_t seed = 0;
   std::string cell;
   std::vector<PhaseRecord> phases;

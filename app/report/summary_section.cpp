@@ -70,6 +70,7 @@ std::string summary_section(const RunRecord& record) {
   }
   std::string html = fmt::format("<div class=\"banner {}\"><h2>{}</h2>\n<p>{}</p>\n", banner.style, banner.title,
                                  escape_html(sentence));
+  if (!record.remedy.empty()) html += "<p>What to do: " + escape_html(record.remedy) + "</p>\n";
   if (record.hand_eye && record.hand_eye->verdict == Verdict::kRejected) {
     html += "<ul>\n";
     for (const std::string& reason : record.hand_eye->reasons) html += "<li>" + escape_html(reason) + "</li>\n";

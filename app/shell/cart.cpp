@@ -10,6 +10,7 @@
 #include "app/cli/small_commands.hpp"
 #include "app/config/load_config.hpp"
 #include "app/report/done_text.hpp"
+#include "app/report/object_picture.hpp"
 #include "app/shell/event_codec.hpp"
 #include "app/shell/job_settings.hpp"
 #include "platform/linux/files.hpp"
@@ -220,6 +221,7 @@ MappingRecord Cart::mapping_record() const {
   m.voxels = bench_->zone_counts();
   m.grid_voxels = bench_->map().counts();
   m.remaining = bench_->remaining();
+  m.since_prior = bench_->change_since_prior();
   m.frames_integrated = bench_->frames_integrated();
   m.frames_dropped = bench_->frames_dropped();
   return m;
@@ -289,6 +291,10 @@ RunRecord Cart::record() const {
   if (bench_->mapped()) {
     r.mapping = mapping_record();
     r.map_pictures = with_map_pictures([](const MapPictureInputs& inputs) { return map_pictures(inputs); });
+    r.mapping->objects = find_objects(bench_->map(), collision_class);
+    for (MapPicture& picture : object_pictures(bench_->map(), r.mapping->objects))
+      r.map_pictures.push_back(std::move(picture));
+    r.mapping->objects.id_of.clear();
   }
   r.safety = safety_record();
   for (const MotionStop& stop : stops_) r.faults.push_back({stop.time.seconds(), stop.cause, ""});
@@ -298,6 +304,7 @@ RunRecord Cart::record() const {
   r.provenance.config_yaml = print_config(config_);
   r.wall = wall_record();
   r.reason = reason_text(r, ending_);
+  if (ending_.has_fault) r.remedy = fault_row(ending_.fault).remedy;
   return r;
 }
 

@@ -116,6 +116,25 @@ TEST_CASE("a board that is not there, a camera that is not on the arm", "[scenar
   CHECK(run_with("camera.fixed=1", rejected("E2006"))["hand_eye"].is_null());
 }
 
+TEST_CASE("an arm that starts outside of its safe zone does not move, and is told what to do", "[scenario]") {
+  const JobFolder folder;
+  folder.write("narrow.yaml",
+               "safe_zone: {radius_m: 0.3, height_m: 0.8}\n"
+               "board: {center_m: [0.9, 0, 0.4], faces: [-1, 0, 0.3]}\n");
+  const ProgramResult run = folder.run({"run", "--cell", "narrow.yaml", "--sensor", "fast", "--out", "run"});
+  INFO(run.err);
+  CHECK(run.exit_code == 6);
+  const Json result = folder.read_json("run/result.json");
+  CHECK(begins_with(result["reason"], "E4002"));
+  const std::string remedy = result["remedy"];
+  CHECK(remedy.find("Jog the arm into the safe zone") != std::string::npos);
+  CHECK(run.err.find(remedy) != std::string::npos);
+  CHECK(folder.read("run/report.html").find(remedy) != std::string::npos);
+  CHECK(result["hand_eye"].is_null());
+  CHECK(result["safety"]["stops"].empty());
+  CHECK(result["truth"]["contacts"] == 0);
+}
+
 TEST_CASE("a board that moves rejects the calibration, or the map", "[scenario]") {
   const Json early = run_with("board.move_at=" + std::to_string(0.5 * sweep_start_s()), rejected("E2007"));
   CHECK(early["hand_eye"]["verdict"] == "rejected");

@@ -67,6 +67,7 @@ class ScriptedWorld : public DecisionSink {
   IntegrateResult integrated{.used = true, .path_free = true};
   CheckBoardResult check{.seen = true, .moved = false};
   int locate_views = 4;
+  Fault no_views_because = Fault::kNothingReachable;
   bool devices = true;
   bool consent = true;
   bool arm_reports = true;
@@ -134,7 +135,7 @@ class ScriptedWorld : public DecisionSink {
   std::size_t pack_answer(JobKind kind, std::span<const std::byte> arguments, std::span<std::byte> result) const {
     switch (kind) {
       case JobKind::kLocateViews:
-        return pack(views_around(arguments_of<FromHere>(arguments).at_rad, locate_views), result);
+        return pack(views_to_locate(arguments_of<FromHere>(arguments).at_rad), result);
       case JobKind::kIdentifyMotions:
         return pack(views_around(arguments_of<FromHere>(arguments).at_rad, 6), result);
       case JobKind::kPlan:
@@ -252,6 +253,11 @@ class ScriptedWorld : public DecisionSink {
       q[5 - i % 6] += 0.1;
       list.views_rad.push_back(q);
     }
+    return list;
+  }
+  ViewList views_to_locate(const JointVector& at) const {
+    ViewList list = views_around(at, locate_views);
+    list.fault = no_views_because;
     return list;
   }
   /// A view beside where the arm stands.

@@ -35,7 +35,7 @@ Handled on_locate_board(Machine& m, const MachineEvent& event) {
     p.views = *list;
     p.view = 0;
     if (p.views.views_rad.empty()) {
-      m.conclude(Outcome::kSafelyStopped, Fault::kNothingReachable);
+      m.conclude(Outcome::kSafelyStopped, list->fault);
     } else {
       go_to_view(m);
     }

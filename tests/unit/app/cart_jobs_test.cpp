@@ -3,7 +3,9 @@
 #include <catch2/catch.hpp>
 #include <memory>
 
+#include "algorithms/mapping/octree_writer.hpp"
 #include "algorithms/vision/camera_model.hpp"
+#include "app/report/map_files.hpp"
 #include "app/shell/event_codec.hpp"
 #include "platform/core/random.hpp"
 #include "platform/journal/archive.hpp"
@@ -11,6 +13,7 @@
 #include "tests/support/mock_color_camera.hpp"
 #include "tests/support/mock_depth_camera.hpp"
 #include "tests/support/sanitized_builds.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace firstlook {
 namespace {
@@ -21,7 +24,9 @@ const JointVector kStart{0, -1.57, 1.57, -1.57, -1.57, 0};  // the simulated cel
 /// The flange's camera looks at a board 0.7 m ahead of where the arm starts; the depth camera at a wall.
 class Bench {
  public:
-  explicit Bench(std::optional<StoredCalibration> stored = std::nullopt) : color_(kColor), workers_(2) {
+  explicit Bench(std::optional<StoredCalibration> stored = std::nullopt, const std::string& prior_map = "none")
+      : color_(kColor), workers_(2) {
+    config_.map.prior = prior_map;
     color_.corners = [this](const hal::Frame& frame) {
       JointVector q = at_rad_;
       q[0] += swing_rad * static_cast<double>(frame.sequence % 7);
@@ -411,6 +416,51 @@ TEST_CASE("a depth picture that repeats itself is frozen, one with hardly a retu
     CHECK_FALSE(integrate().frozen);
     CHECK_FALSE(integrate().frozen);
   }
+}
+
+TEST_CASE("a prior map makes nothing known and changes no class", "[jobs]") {
+  const test::TemporaryFolder folder("firstlook-prior");
+  const Config config;
+  const GridGeometry grid = GridGeometry::covering(Eigen::Vector3d(config.map.low_m.data()),
+                                                   Eigen::Vector3d(config.map.high_m.data()), config.map.resolution_m);
+  VoxelMap prior(grid, VoxelMap::Planes::kLogOddsOnly);
+  for (std::size_t i = 0; i < prior.size(); ++i)
+    prior.set(i, i % 3 == 0 ? VoxelClass::kOccupied : VoxelClass::kFree, 0);
+  const std::string file = (folder.path() / "map.ot").string();
+  REQUIRE(write_streamed(file, [&](ByteSink sink) { write_ot(prior, kOctreeDepth, sink); }));
+
+  struct Known {
+    std::vector<std::int8_t> log_odds;
+    std::vector<std::uint8_t> free_before, free_after;
+  };
+  const auto work = [](Bench& bench) {
+    const VoxelMap& map = bench.bench().map();
+    Known known{{}, std::vector<std::uint8_t>(map.size()), std::vector<std::uint8_t>(map.size())};
+    bench.calibrate();
+    CHECK(map.counts().unknown == map.size());
+    map.free_mask(bench.bench().last_stamp_s(), 600, known.free_before);
+    REQUIRE(bench.result_of<IntegrateResult>(JobKind::kIntegrate, bench.depth_look(kStart)).used);
+    map.free_mask(bench.bench().last_stamp_s(), 600, known.free_after);
+    known.log_odds.assign(map.log_odds().begin(), map.log_odds().end());
+    return known;
+  };
+  Known without;
+  {
+    Bench bench;
+    without = work(bench);
+    CHECK_FALSE(bench.bench().change_since_prior());
+  }
+  Bench bench(std::nullopt, file);
+  const Known with = work(bench);
+  CHECK(with.free_before == without.free_before);
+  CHECK(with.free_after == without.free_after);
+  CHECK(with.log_odds == without.log_odds);
+  const MapChange change = bench.bench().change_since_prior().value();
+  const VoxelCounts zone = bench.bench().zone_counts();
+  CHECK(change.unseen_occupied + change.unseen_free == zone.unknown);
+  CHECK(change.gone + change.still_free == zone.free);
+  CHECK(change.newly_occupied + change.still_occupied == zone.occupied);
+  CHECK(change.gone > 0);
 }
 
 }  // namespace firstlook

@@ -67,7 +67,7 @@ Config all_changed() {
                    "runs/first: one/hand_eye.yaml",
                    4};
   c.depth = {0.4, 6, 3.5, 0.003};
-  c.map = {0.02, {-1, -1, 0}, {1, 1, 1}, 60, "ignore"};
+  c.map = {0.02, {-1, -1, 0}, {1, 1, 1}, 60, "ignore", "earlier/map.ot"};
   c.explore = {61, 401, 2001, 9, 3};
   c.clearance = {0.001, 0.002, 0.03, 4};
   c.memory = {512};

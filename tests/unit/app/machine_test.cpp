@@ -60,6 +60,37 @@ TEST_CASE("a board that is nowhere ends the job safely", "[machine]") {
   CHECK(world.ending.fault == Fault::kBoardNotLocated);
 }
 
+TEST_CASE("nothing reachable from the start ends the job safely, without a motion, with why", "[machine]") {
+  for (const Fault why : {Fault::kNothingReachable, Fault::kStartBlocked}) {
+    ScriptedWorld world;
+    world.locate_views = 0;
+    world.no_views_because = why;
+    world.plan = [](const PlanArguments&) { return PlanResult{}; };
+    world.run_until(StateId::kReady);
+    world.press(OperatorAction::kPlay);
+    REQUIRE(world.run_to_end());
+    CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+    CHECK(world.ending.fault == why);
+    CHECK(world.segments.empty());
+  }
+}
+
+TEST_CASE("a sweep that finds no room to move ends the job safely, after some looks around", "[machine]") {
+  ScriptedWorld world;
+  world.next_view = [](const FromHere&) {
+    NextViewResult r;
+    r.blocked = true;
+    return r;
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.was_in(StateId::kSweep));
+  CHECK_FALSE(world.was_in(StateId::kMove));
+  CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+  CHECK(world.ending.fault == Fault::kStartBlocked);
+}
+
 TEST_CASE("a camera that no joint moves is reported", "[machine]") {
   ScriptedWorld world;
   world.detect = [](const DetectArguments&) {

@@ -52,7 +52,7 @@ using Keys = std::vector<std::string>;
 
 TEST_CASE("result.json keeps its schema", "[report]") {
   const ordered_json json = ordered_json::parse(result_json(sample_record()));
-  CHECK(keys_of(json) == Keys{"outcome", "reason", "seed", "cell", "phases", "decisions_hash", "hand_eye",
+  CHECK(keys_of(json) == Keys{"outcome", "reason", "remedy", "seed", "cell", "phases", "decisions_hash", "hand_eye",
                               "depth_camera", "time_offset", "mapping", "safety", "memory", "wall", "truth"});
   CHECK(json["outcome"] == "done");
   CHECK(json["seed"] == 7);
@@ -72,7 +72,14 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(hand_eye["covariance"].size() == 36);
   CHECK(hand_eye["reasons"].is_array());
 
-  CHECK(keys_of(json["mapping"]) == Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "remaining"});
+  CHECK(keys_of(json["mapping"]) ==
+        Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "remaining", "prior", "objects"});
+  CHECK(keys_of(json["mapping"]["prior"]) == Keys{"still_occupied", "newly_occupied", "gone", "still_free",
+                                                  "unseen_occupied", "unseen_free", "first_known"});
+  CHECK(json["mapping"]["prior"]["gone"] == 75);
+  CHECK(keys_of(json["mapping"]["objects"][1]) == Keys{"id", "shape", "bounds_room", "voxels", "box"});
+  CHECK(json["mapping"]["objects"][1]["shape"] == "box");
+  CHECK(keys_of(json["mapping"]["objects"][1]["box"]) == Keys{"center_m", "size_m", "quaternion_xyzw"});
   CHECK(json["mapping"]["views"] == 24);
   CHECK(keys_of(json["mapping"]["voxels"]) == Keys{"unknown", "free", "occupied"});
   CHECK(keys_of(json["mapping"]["grid_voxels"]) == Keys{"unknown", "free", "occupied"});

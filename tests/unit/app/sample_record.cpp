@@ -109,6 +109,25 @@ MappingRecord mapping() {
   m.remaining = {{1850, "occluded", {0.9, 0.3, 0.2}},
                  {640, "out_of_range", {-0.2, 0.1, -0.1}},
                  {210, "occluded", {0.7, -0.6, 0.5}}};
+  m.since_prior = MapChange{.still_occupied = 3900,
+                            .newly_occupied = 120,
+                            .gone = 75,
+                            .still_free = 30000,
+                            .unseen_occupied = 17,
+                            .unseen_free = 230,
+                            .first_known = 900};
+  m.objects.objects = {
+      {.id = 1,
+       .shape = ObjectShape::kPlane,
+       .bounds_room = true,
+       .voxels = 1200,
+       .box = {{0.9, 0, -0.2}, {1.2, 0.8, 0.1}, Eigen::Quaterniond::Identity()}},
+      {.id = 2,
+       .shape = ObjectShape::kBox,
+       .bounds_room = false,
+       .voxels = 340,
+       .box = {{0.9, 0.1, 0}, {0.4, 0.3, 0.3}, Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()))}}};
+  m.objects.specks = 21;
   m.frames_integrated = 412;
   m.frames_dropped = 3;
   return m;

@@ -1,24 +1,15 @@
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cstring>
-#include <sstream>
 #include <string>
 
 #include "algorithms/mapping/moveit_scene.hpp"
 #include "algorithms/mapping/ply_writer.hpp"
 #include "platform/core/random.hpp"
+#include "tests/support/collect_bytes.hpp"
 
 namespace firstlook {
 namespace {
-
-template <typename Write>
-std::string collect(Write write) {
-  std::string text;
-  write([&](std::span<const std::byte> bytes) {
-    text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  });
-  return text;
-}
 
 VoxelMap random_map(double occupied_fraction, std::uint64_t seed) {
   Random random(seed);

@@ -119,4 +119,25 @@ TEST_CASE("the map's picture shows boxes, veil and a floor with lines", "[mappin
   CHECK(veiled.bytes == box.bytes);  // out of reach: no veil
 }
 
+TEST_CASE("voxels take the colours that they are given, or are looked through", "[mapping][image]") {
+  const Eigen::Vector3d low(-1, -1, 0), high(1, 1, 1);
+  VoxelMap map(GridGeometry::covering(low, high, 0.1));
+  for (std::size_t i = 0; i < map.size(); ++i) map.set(i, VoxelClass::kFree, 0);
+  const auto viewpoint = Viewpoint::seeing(low, high, -2.2, 0.6, 240, 192, 8);
+  Picture empty(240, 192), hidden(240, 192), red(240, 192);
+  draw_map(map, viewpoint, {}, empty.image);
+  const std::size_t box = map.geometry().index({10, 10, 5});
+  map.set(box, VoxelClass::kOccupied, 0);
+  using Color = std::optional<std::array<std::uint8_t, 3>>;
+  draw_map(map, viewpoint, {}, [](std::size_t) { return Color(); }, hidden.image);
+  CHECK(hidden.bytes == empty.bytes);
+  const auto paint = [box](std::size_t index) { return index == box ? Color({200, 0, 0}) : Color({0, 200, 0}); };
+  draw_map(map, viewpoint, {}, paint, red.image);
+  const Eigen::Vector2d top = MapProjection(viewpoint, 240, 192).pixel({0.05, 0.05, 0.6});
+  const auto color = red.at(static_cast<int>(std::lround(top.x())), static_cast<int>(std::lround(top.y())));
+  CHECK(color[0] > 100);
+  CHECK(color[1] == 0);
+  CHECK(color[2] == 0);
+}
+
 }  // namespace firstlook

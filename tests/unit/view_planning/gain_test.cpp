@@ -87,3 +87,40 @@ TEST_CASE("the frontier is unknown and touches free space", "[gain]") {
     REQUIRE(world.zone[i] == 1);
   }
 }
+
+TEST_CASE("an earlier map says where to look first, and nothing else", "[gain]") {
+  SmallWorld world(Truth::room());
+  VoxelMap prior(world.map.geometry(), VoxelMap::Planes::kLogOddsOnly);
+  for (std::size_t i = 0; i < prior.size(); ++i)
+    prior.set(i, i % 3 == 0 ? VoxelClass::kOccupied : VoxelClass::kFree, 0);
+  GainModel model(world.map.geometry(), world.sensor);
+  model.allow_prior();
+  GainWorker worker = model.worker();
+  JointVector beside = world.q;
+  beside[0] += 0.1;
+  std::uint32_t expected_before = 0;
+  for (int look = 0; look < 2; ++look) {
+    INFO("after " << look << " looks");
+    model.prepare(world.context());
+    const ViewGain without = model.count(world.context(), beside, worker);
+    const std::vector<std::uint32_t> frontier(model.frontier().begin(), model.frontier().end());
+    ViewContext hinted = world.context();
+    hinted.prior = &prior;
+    model.prepare(hinted);
+    const ViewGain with = model.count(hinted, beside, worker);
+    REQUIRE(with.unknown == without.unknown);
+    REQUIRE(with.again == without.again);
+    REQUIRE(without.expected_surface == 0);
+    REQUIRE(std::equal(frontier.begin(), frontier.end(), model.frontier().begin(), model.frontier().end()));
+    if (look == 0) {
+      expected_before = with.expected_surface;
+      REQUIRE(with.expected_surface > 0.25 * with.unknown);
+      REQUIRE(with.expected_surface < 0.42 * with.unknown);
+      REQUIRE(with.weight() == without.weight() + with.expected_surface);
+      world.look(beside);
+      world.update();
+    } else {
+      REQUIRE(with.expected_surface < 0.05 * expected_before);  // seen: nothing is expected there any more
+    }
+  }
+}
