@@ -77,7 +77,7 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
   set_board(cell.board, config.board);
-  config.depth = {cell.depth_range_min_m, cell.depth_range_max_m, cell.depth_range_trusted_m, cell.depth_noise_at_1m};
+  config.calibration.touch_tip_m = {cell.flange_p_tip_m.x(), cell.flange_p_tip_m.y(), cell.flange_p_tip_m.z()};
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
         {{box.low_m.x(), box.low_m.y(), box.low_m.z()}, {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
@@ -108,7 +108,10 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
     claims.color_offset_s = bench.alignment().color_stamps.offset_s;
     claims.depth_offset_s = bench.alignment().depth_stamps.offset_s;
   }
-  if (bench.mapped()) claims.map = &bench.map();
+  if (bench.mapped()) {
+    claims.map = &bench.map();
+    claims.reach_zone = bench.zone();
+  }
   claims.now_s = bench.last_stamp_s();
   claims.free_max_age_s = config.map.free_max_age_s;
   if (bench.clearance_terms()) claims.observable.clearance = bench.clearance_terms()->clearance();
@@ -129,6 +132,7 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
   truth.unknown_entries = figures.unknown_entries;
   truth.coverage_of_observable = figures.coverage_of_observable;
   truth.false_free_voxels = figures.false_free_voxels;
+  truth.false_occupied_fraction = figures.false_occupied_fraction;
   if (claims.map == nullptr) return;
   const VoxelMap swept = bench.map_after_sweep();
   claims.map = &swept;
@@ -175,6 +179,12 @@ void narrate_result(const RunRecord& record, Narrator& narrator) {
       const Verification& v = *record.verified->verification;
       narrator.line(fmt::format("verified  on {} views: chi-square {:.1f}, allowed {:.1f}; {:.2f} px, {:.2f} mm RMS",
                                 v.views.size(), v.chi2, v.chi2_limit, v.residual_rms_px, v.residual_rms_m * 1e3));
+    }
+    if (const auto& touched = record.hand_eye->touch_test) {
+      narrator.line(fmt::format("touched   camera off by {:.2f} ± {:.2f} mm, {:.2f} ± {:.2f} mrad by {} of {} touches",
+                                touched->mean.head<3>().norm() * 1e3, touched->mean_sigma.head<3>().norm() * 1e3,
+                                touched->mean.tail<3>().norm() * 1e3, touched->mean_sigma.tail<3>().norm() * 1e3,
+                                touched->board.used, touched->board.fits.size()));
     }
     if (record.alignment && record.alignment->depth_camera.estimate) narrate_alignment(*record.alignment, narrator);
     for (const std::string& reason : record.hand_eye->reasons) narrator.line("rejected  " + reason);
@@ -232,7 +242,7 @@ int run_job(const RunCommand& command) {
   std::optional<BoardSpec> board;  // load_config has refused what is no board
   if (names_a_board(config.board)) board = board_of(config.board).value();
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, board});
+                                        command.faults, config.workers, board, config.depth.sensor});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);

@@ -385,6 +385,27 @@ void validate_hand_eye(const CameraIntrinsics& given, const Targets& targets, st
   if (!result.likely_mistake && !result.intrinsics) name_wrong_intrinsics(given, targets, used.views, options, result);
 }
 
+Status test_hand_eye_by_touch(const Targets& targets, const TouchRecord& touched, std::span<const PosePair> used,
+                              const TouchTestLimits& limits, HandEyeResult& result) {
+  const auto target = static_cast<std::size_t>(touched.target);
+  if (!targets.has(touched.target) || target >= result.targets.size() || result.targets[target].views == 0) {
+    return failure(Fault::kTouchesUnusable, "no view that was used shows the board that was touched");
+  }
+  const BoardSpec& board = targets[touched.target];
+  TouchOptions options;
+  options.tip = touched.tip;
+  options.arm_sigma = result.arm_sigma;
+  auto located = locate_touched_board(board, touched.touches, options);
+  if (!located) return std::unexpected(located.error());
+  const TargetPose& calibrated = result.targets[target];
+  result.touch_test = test_by_touch(board, std::move(*located),
+                                    {result.flange_T_camera, calibrated.base_T_board, calibrated.covariance},
+                                    pairs_of_target(used, touched.target), limits);
+  for (const std::string& reason : result.touch_test->reasons) result.reasons.push_back(reason);
+  if (!result.touch_test->agrees()) result.verdict = Verdict::kRejected;
+  return {};
+}
+
 std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const Targets& targets,
                                  std::span<const CalibrationView> views, const HandEyeResult& result) {
   return select_views(camera, targets, views, result.fits, result.flange_T_camera).pairs;

@@ -10,6 +10,7 @@
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
 #include "algorithms/calibration/hand_eye_refinement.hpp"
 #include "algorithms/calibration/likely_mistake.hpp"
+#include "algorithms/calibration/touch_test.hpp"
 
 namespace firstlook {
 
@@ -26,6 +27,7 @@ struct VerdictLimits {
   double mapping_distance_m = 1.5;
   double tolerance_m = 0.01;  ///< of the gripper, for the usable distance (thesis eq. 7-2)
   double usable_distance_min_m = 0.3;
+  TouchTestLimits touch;
 };
 
 struct HandEyeOptions {
@@ -78,6 +80,14 @@ struct HandEyeResult {
   /// What people most likely did wrong; also the last of the reasons when rejected. Of an accepted calibration: what is
   /// wrong with the views that were left out. Empty when nothing was found.
   std::optional<LikelyMistake> likely_mistake;
+  std::optional<TouchTest> touch_test;  ///< when somebody touched the board (test_hand_eye_by_touch)
+};
+
+/// What somebody did with the arm's tip: the board that was touched, and the touches.
+struct TouchRecord {
+  int target = 0;  ///< which of the targets
+  std::vector<Touch> touches;
+  std::optional<TipOffset> tip;  ///< empty: to be estimated
 };
 
 /// Several targets are solved together as refine_hand_eye says; held out and drawn at random are then whole places of
@@ -99,6 +109,13 @@ struct HandEyeResult {
                                                    const HandEyeOptions& options = {});
 void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
                        const HandEyeOptions& options, HandEyeResult& result);
+
+/// The touch test of a validated calibration: fills touch_test and rejects where it does not agree.
+/// @param used  the pose pairs that it was solved from (used_pairs), or more of the same target
+/// @return the errors of locate_touched_board; kTouchesUnusable when no view shows the touched board
+[[nodiscard]] Status test_hand_eye_by_touch(const Targets& targets, const TouchRecord& touched,
+                                            std::span<const PosePair> used, const TouchTestLimits& limits,
+                                            HandEyeResult& result);
 
 /// The pose pairs that `result` was solved from, settled among the poses that each picture allows.
 [[nodiscard]] std::vector<PosePair> used_pairs(const CameraIntrinsics& camera, const Targets& targets,

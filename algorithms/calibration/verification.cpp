@@ -8,6 +8,7 @@
 #include "algorithms/calibration/board_ambiguity.hpp"
 #include "algorithms/calibration/chi_square.hpp"
 #include "algorithms/calibration/hand_eye_closed_form.hpp"
+#include "algorithms/calibration/moved_by.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/view_design.hpp"
 #include "algorithms/vision/board_pose.hpp"
@@ -28,15 +29,6 @@ struct BoardReading {
   Matrix6d by_hand_eye = Matrix6d::Zero();
   Matrix6d own_covariance = Matrix6d::Zero();
 };
-
-/// d(R p + t) for a turn of R by d: d x (R p), so the derivative by d is -[R p]x.
-Matrix6d moved_by(const Eigen::Matrix3d& to_base, const Eigen::Vector3d& lever) {
-  Matrix6d j = Matrix6d::Zero();
-  j.topLeftCorner<3, 3>() = to_base;
-  j.topRightCorner<3, 3>() = -to_base * cross_matrix(lever);
-  j.bottomRightCorner<3, 3>() = to_base;
-  return j;
-}
 
 BoardReading read_board(const SeenView& seen, const HandEyeClaim& claim) {
   const Pose flange = seen.view->base_T_flange.pose();

@@ -129,13 +129,14 @@ RowFrame frame_of(const DepthRays& rays, float range_squared_m2, double units_pe
   return frame;
 }
 
-bool rigid(const Pose& pose) {
-  const Eigen::Matrix3d rotation = pose.linear();
-  const Eigen::Matrix3d error = rotation.transpose() * rotation - Eigen::Matrix3d::Identity();
-  return pose.matrix().allFinite() && rotation.determinant() > 0 && error.cwiseAbs().maxCoeff() <= kRotationTolerance;
-}
-
 }  // namespace
+
+bool is_rigid(const Transform<Base, Depth>& base_T_depth) {
+  const Eigen::Matrix3d rotation = base_T_depth.pose().linear();
+  const Eigen::Matrix3d error = rotation.transpose() * rotation - Eigen::Matrix3d::Identity();
+  return base_T_depth.pose().matrix().allFinite() && rotation.determinant() > 0 &&
+         error.cwiseAbs().maxCoeff() <= kRotationTolerance;
+}
 
 DepthRays::DepthRays(const DepthSensor& sensor)
     : sensor_(sensor),
@@ -182,7 +183,7 @@ Status DepthRays::check(const DepthImage& depth, const Transform<Base, Depth>& b
                    depth.pixels.size());
   if (!(depth.units_per_m > 0) || !std::isfinite(depth.units_per_m))
     return failure(Fault::kFrameRefused, "depth scale {} is not a positive number", depth.units_per_m);
-  if (!rigid(base_T_depth.pose())) return failure(Fault::kFrameRefused, "its pose is not a rigid motion");
+  if (!is_rigid(base_T_depth)) return failure(Fault::kFrameRefused, "its pose is not a rigid motion");
   return {};
 }
 

@@ -15,14 +15,17 @@
 
 namespace firstlook {
 
-/// A depth sensor's limits. Defaults are the Kinect's (the thesis: 0.5 to 5 m, random error growing with z²).
+/// A depth sensor's limits (sensor_presets.hpp says where figures come from). Defaults are the Kinect's.
 struct DepthSensor {
   CameraIntrinsics intrinsics;
   double range_min_m = 0.5;      ///< along the optical axis; nearer returns are dropped
   double range_max_m = 5.0;      ///< distance from the sensor
   double range_trusted_m = 3.0;  ///< safety rule 9: a return beyond clears up to here and marks nothing
-  double noise_at_1m = 0.00285;  ///< standard deviation, m at 1 m; times z²
+  double baseline_m = 0.075;     ///< to the projector or second camera along +x, whose shadow has no returns; 0: none
 };
+
+/// Whether a pose is a rigid motion of finite numbers.
+[[nodiscard]] bool is_rigid(const Transform<Base, Depth>& base_T_depth);
 
 /// What became of a frame's pixels.
 struct PixelCounts {
@@ -63,6 +66,13 @@ class DepthRays {
   /// x / z of each column and y / z of each row of a pinhole image.
   [[nodiscard]] std::span<const double> column_slopes() const { return ray_x_; }
   [[nodiscard]] std::span<const double> row_slopes() const { return ray_y_; }
+
+  /// A pixel's ray at depth 1; NaN where the lens model has none.
+  [[nodiscard]] Eigen::Vector3d direction(int u, int v) const {
+    const auto column = static_cast<std::size_t>(u), row = static_cast<std::size_t>(v);
+    const std::size_t pixel = row * static_cast<std::size_t>(sensor_.intrinsics.width) + column;
+    return {ray_x_[per_pixel_ ? pixel : column], ray_y_[per_pixel_ ? pixel : row], 1};
+  }
 
   /// Whether a frame can be used at all: size, depth scale, a pose that is a rigid motion, and a self filter that is
   /// empty or has the frame's size. @return kFrameRefused

@@ -38,6 +38,9 @@ class Inserter {
                                                std::span<const float> self_depth_m, double stamp_s);
 
   [[nodiscard]] const DepthSensor& sensor() const { return sensor_; }
+  /// The voxels that the last frame missed and hit, as VoxelMap::apply had them.
+  [[nodiscard]] std::span<const std::uint64_t> missed() const { return missed_; }
+  [[nodiscard]] std::span<const std::uint64_t> hit() const { return hit_; }
 
  private:
   [[nodiscard]] Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;

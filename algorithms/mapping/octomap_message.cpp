@@ -42,7 +42,7 @@ class Members {
   void add(Number number) {
     while (aligned_ && bytes_.size() % sizeof(Number) != 0) bytes_ += '\0';
     const auto raw = std::bit_cast<std::array<char, sizeof(Number)>>(number);
-    bytes_.append(raw.begin(), raw.end());
+    bytes_.append(raw.data(), raw.size());
   }
   void add_text(std::string_view text) {
     add(static_cast<std::uint32_t>(text.size() + (aligned_ ? 1 : 0)));

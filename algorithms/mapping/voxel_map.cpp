@@ -56,6 +56,7 @@ VoxelMap::VoxelMap(const GridGeometry& geometry, Planes planes) : geometry_(geom
   flags_.assign(geometry.count(), 0);
   octants_.assign(geometry.count(), {});
   first_free_pose_.assign(geometry.count(), 0);
+  if (planes == Planes::kWithOpenRays) first_open_pose_.assign(geometry.count(), 0);
   seen_s_.assign(geometry.count(), 0);
   poses_.reserve(kPosesMax);
   different_.assign(kPosesMax + 1, 0);
@@ -69,7 +70,7 @@ VoxelMap::VoxelMap(const GridGeometry& geometry, std::vector<std::int8_t> log_od
 std::size_t VoxelMap::required_bytes(const GridGeometry& geometry, Planes planes) {
   if (planes == Planes::kLogOddsOnly) return geometry.count();
   return geometry.count() * (sizeof(std::int8_t) + sizeof(std::uint8_t) + sizeof(Octants) + sizeof(std::uint16_t) +
-                             sizeof(std::uint32_t)) +
+                             sizeof(std::uint32_t) + (planes == Planes::kWithOpenRays ? sizeof(std::uint16_t) : 0)) +
          kPosesMax * (sizeof(SeenFrom) + 1);
 }
 
@@ -156,15 +157,9 @@ void VoxelMap::forget_known_free() {
 FrameChange VoxelMap::apply(std::span<const std::uint64_t> missed, std::span<const std::uint64_t> hits,
                             const Transform<Base, Depth>& base_T_depth, double stamp_s, std::size_t first_word) {
   ENSURE(3003, first_word + missed.size() <= bit_words(geometry_) && hits.size() == missed.size());
-  ENSURE(3004, stamp_s >= 0 && stamp_s < 4294967295.0);
+  const Frame frame = begin_frame(base_T_depth, stamp_s);
   const std::size_t first = std::min(size(), first_word * 64), last = std::min(size(), first + missed.size() * 64);
   if (!has_motion_planes()) return update_log_odds(missed, hits, std::span(log_odds_).subspan(first, last - first));
-  Frame frame;
-  frame.stamp_s = static_cast<std::uint32_t>(stamp_s);
-  if (has_motion_planes()) {
-    frame.pose_id = pose_id(base_T_depth);
-    mark_different_poses(base_T_depth);
-  }
   FrameChange change;
   for (std::size_t word = 0; word < missed.size(); ++word) {
     const std::size_t voxel = first + word * 64;
@@ -172,6 +167,55 @@ FrameChange VoxelMap::apply(std::span<const std::uint64_t> missed, std::span<con
     for_each_bit(hits[word], voxel, [&](std::size_t index) { hit(index, frame, change); });
   }
   return change;
+}
+
+FrameChange VoxelMap::apply_open(std::span<std::uint64_t> passed, const Transform<Base, Depth>& base_T_depth,
+                                 double stamp_s) {
+  ENSURE(3008, passed.size() == bit_words(geometry_) && !first_open_pose_.empty());
+  const Frame frame = begin_frame(base_T_depth, stamp_s);
+  FrameChange change;
+  const auto is_confirmed = [&](std::size_t index) {
+    std::uint16_t& first = first_open_pose_[index];
+    if (first == 0) first = frame.pose_id;
+    const bool open = (flags_[index] & (kSuspect | kHitInLatestFrame)) == 0 && octants_[index].surface == 0;
+    return open && voxel_class(index) != VoxelClass::kOccupied && different_[first] != 0;
+  };
+  for (std::size_t word = 0; word < passed.size(); ++word) {
+    std::uint64_t confirmed = 0;
+    for_each_bit(passed[word], word * 64, [&](std::size_t index) {
+      if (is_confirmed(index)) confirmed |= 1ULL << (index & 63);
+    });
+    for_each_bit(confirmed, word * 64, [&](std::size_t index) { miss(index, frame, change); });
+    passed[word] = confirmed;
+  }
+  return change;
+}
+
+void VoxelMap::suspect(std::span<const std::uint64_t> voxels) {
+  ENSURE(3007, voxels.size() == bit_words(geometry_) && has_motion_planes());
+  for (std::size_t word = 0; word < voxels.size(); ++word)
+    for_each_bit(voxels[word], word * 64, [&](std::size_t index) { flags_[index] |= kSuspect; });
+}
+
+std::size_t VoxelMap::forget_old_occupied(double now_s, double max_age_s) {
+  std::size_t forgotten = 0;
+  for (std::size_t i = 0; i < flags_.size(); ++i) {
+    if (voxel_class(i) != VoxelClass::kOccupied || !expires(i, now_s, max_age_s)) continue;
+    set(i, VoxelClass::kUnknown, static_cast<double>(seen_s_[i]));
+    ++forgotten;
+  }
+  return forgotten;
+}
+
+VoxelMap::Frame VoxelMap::begin_frame(const Transform<Base, Depth>& base_T_depth, double stamp_s) {
+  ENSURE(3004, stamp_s >= 0 && stamp_s < 4294967295.0);
+  Frame frame;
+  frame.stamp_s = static_cast<std::uint32_t>(stamp_s);
+  if (has_motion_planes()) {
+    frame.pose_id = pose_id(base_T_depth);
+    mark_different_poses(base_T_depth);
+  }
+  return frame;
 }
 
 void VoxelMap::miss(std::size_t index, const Frame& frame, FrameChange& change) {
@@ -245,7 +289,7 @@ void VoxelMap::set(std::size_t index, VoxelClass voxel_class, double stamp_s) {
   constexpr std::int8_t kValues[] = {kUnknownLogOdds, kLogOddsMin, kLogOddsMax};
   log_odds_[index] = kValues[static_cast<std::size_t>(voxel_class)];
   if (!has_motion_planes()) return;
-  constexpr std::uint8_t kKept = kInSafeZone | kZoneRevoked | kBlocked | kFixedBody;
+  constexpr std::uint8_t kKept = kInSafeZone | kZoneRevoked | kBlocked | kFixedBody | kSuspect;
   flags_[index] = static_cast<std::uint8_t>(flags_[index] & kKept);
   if (voxel_class == VoxelClass::kFree) flags_[index] |= kFreeFromTwoPoses;
   if (voxel_class == VoxelClass::kOccupied) flags_[index] |= kHitInLatestFrame;

@@ -74,7 +74,8 @@ class VoxelMap {
  public:
   enum class Planes : std::uint8_t {
     kAll,
-    kLogOddsOnly,  ///< a tenth of the memory; nothing is ever known free and there is no safe zone: for offline maps
+    kWithOpenRays,  ///< and where rays without a return passed (open_rays.hpp): two bytes more a voxel
+    kLogOddsOnly,   ///< a tenth of the memory; nothing is ever known free and there is no safe zone: for offline maps
   };
   explicit VoxelMap(const GridGeometry& geometry, Planes planes = Planes::kAll);
   /// A map from elsewhere, kLogOddsOnly. @param log_odds  geometry.count() values: kUnknownLogOdds or within the clamps
@@ -149,6 +150,16 @@ class VoxelMap {
                     const Transform<Base, Depth>& base_T_depth, double stamp_s, std::size_t first_word = 0);
   [[nodiscard]] static std::size_t bit_words(const GridGeometry& geometry) { return (geometry.count() + 63) / 64; }
 
+  /// Safety rule 9: one miss for voxels that open rays of this pose and of an earlier, different one pass. Voxels that
+  /// were hit, still hold a surface, or are suspect stay as they are. Needs Planes::kWithOpenRays.
+  /// @param passed  none of them updated by the frame itself; voxels that were not missed are taken out
+  FrameChange apply_open(std::span<std::uint64_t> passed, const Transform<Base, Depth>& base_T_depth, double stamp_s);
+  /// From now on open rays clear none of these voxels: something dark may stand there.
+  void suspect(std::span<const std::uint64_t> voxels);
+
+  /// Occupied voxels that no frame saw for longer than `max_age_s` become unknown, never free. @return how many
+  std::size_t forget_old_occupied(double now_s, double max_age_s);
+
   /// Sets a voxel at its clamp (or unknown) as if two poses had seen it at `stamp_s`: for maps that come from
   /// elsewhere.
   void set(std::size_t index, VoxelClass voxel_class, double stamp_s);
@@ -169,6 +180,7 @@ class VoxelMap {
     kBlocked = 16,
     kForgotten = 32,
     kFixedBody = 64,
+    kSuspect = 128,
   };
 
   /// The frame being applied.
@@ -177,6 +189,7 @@ class VoxelMap {
     std::uint32_t stamp_s = 0;
   };
 
+  [[nodiscard]] Frame begin_frame(const Transform<Base, Depth>& base_T_depth, double stamp_s);
   std::uint16_t pose_id(const Transform<Base, Depth>& base_T_depth);
   void mark_different_poses(const Transform<Base, Depth>& base_T_depth);
   void miss(std::size_t index, const Frame& frame, FrameChange& change);
@@ -187,6 +200,7 @@ class VoxelMap {
   std::vector<std::uint8_t> flags_;
   std::vector<Octants> octants_;
   std::vector<std::uint16_t> first_free_pose_;  ///< index into poses_ plus 1; 0 is none
+  std::vector<std::uint16_t> first_open_pose_;  ///< the same of open rays
   std::vector<std::uint32_t> seen_s_;           ///< stamp of the latest frame that saw the voxel
   std::vector<SeenFrom> poses_;
   std::vector<std::uint8_t> different_;  ///< for each pose: does the current frame differ from it?

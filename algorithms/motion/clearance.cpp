@@ -11,7 +11,7 @@ ClearanceTerms required_clearance(const ClearanceInputs& in) {
   ClearanceTerms t;
   t.half_voxel_diagonal_m = in.voxel_m * std::sqrt(3.0) / 2;
   t.sigma_hand_eye_m = std::hypot(in.sigma_hand_eye_m, in.sigma_hand_eye_rad * in.range_m);
-  t.sigma_depth_m = in.sigma_depth_at_1m_m * in.range_m * in.range_m;
+  t.sigma_depth_m = std::hypot(in.sigma_depth_floor_m, in.sigma_depth_at_1m_m * in.range_m * in.range_m);
   t.sigma_tracking_m = in.sigma_tracking_m;
   t.sigma_depth_camera_m =
       std::hypot(in.sigma_depth_camera_m, in.sigma_depth_camera_rad * in.range_m, in.sigma_depth_scale * in.range_m);

@@ -13,6 +13,7 @@ struct ClearanceInputs {
   double sigma_depth_camera_m = 0;  ///< the depth camera on the colour camera, one sigma
   double sigma_depth_camera_rad = 0;
   double sigma_depth_scale = 0;         ///< of how much too long its depths are
+  double sigma_depth_floor_m = 0;       ///< at any distance, together with
   double sigma_depth_at_1m_m = 0.0015;  ///< grows with z^2 (FACTS: Kinect, a few mm at 0.5 m to 4 cm at 5 m)
   double sigma_tracking_m = 0.0005;     ///< arm's pose at a frame's time stamp
   double payload_sag_m = 0.001;

@@ -55,6 +55,35 @@ void narrate_views(const CalibrationDataset& data, const HandEyeResult& result) 
   }
 }
 
+void print_touch_test(const TouchTest& test) {
+  const TouchedBoard& b = test.board;
+  const Eigen::Vector3d tip = b.flange_p_tip_m * 1e3, t = test.mean.head<3>() * 1e3, r = test.mean.tail<3>() * 1e3;
+  const Vector6d sigma = test.mean_sigma * 1e3, views = test.view_deviation * 1e3;
+  fmt::print(
+      "touch test       {} of {} touches, {:.2f} mm RMS from the board's corners; tip {} ({:.2f}, {:.2f}, {:.2f}) mm\n",
+      b.used, b.fits.size(), b.horn_residual_rms_m * 1e3, b.tip_estimated ? "estimated" : "given", tip.x(), tip.y(),
+      tip.z());
+  for (const TouchFit& fit : b.fits) {
+    if (fit.used) continue;
+    fmt::print("                 {} left out: {:.1f} mm off{}\n", fit.name, fit.off_m.norm() * 1e3,
+               fit.rather ? ", the tip stood on " + fit.rather_name : "");
+  }
+  fmt::print(
+      "camera's error   ({:.2f}, {:.2f}, {:.2f}) mm ({:.2f}, {:.2f}, {:.2f}) mrad in its axes, mean of {} places\n",
+      t.x(), t.y(), t.z(), r.x(), r.y(), r.z(), test.places);
+  fmt::print("  expected sigma ({:.2f}, {:.2f}, {:.2f}) mm ({:.2f}, {:.2f}, {:.2f}) mrad\n", sigma[0], sigma[1],
+             sigma[2], sigma[3], sigma[4], sigma[5]);
+  fmt::print("  over the views ({:.2f}, {:.2f}, {:.2f}) mm ({:.2f}, {:.2f}, {:.2f}) mrad\n", views[0], views[1],
+             views[2], views[3], views[4], views[5]);
+  if (test.static_looks > 0) {
+    const Vector6d s = test.static_deviation * 1e3;
+    fmt::print("  static looks   ({:.2f}, {:.2f}, {:.2f}) mm ({:.2f}, {:.2f}, {:.2f}) mrad, {} of them\n", s[0], s[1],
+               s[2], s[3], s[4], s[5], test.static_looks);
+  }
+  fmt::print("  board          chi-square {:.1f} between touched and seen, allowed {:.1f}\n", test.chi2,
+             test.chi2_limit);
+}
+
 void print_text(const HandEyeResult& r) {
   const Eigen::Vector3d t = r.flange_T_camera.translation() * 1e3;
   const Eigen::Quaterniond q = r.flange_T_camera.quaternion();
@@ -95,6 +124,7 @@ void print_text(const HandEyeResult& r) {
              r.ax_xb_all_pairs.rotation_rms_deg, r.ax_xb_all_pairs.translation_rms_mm,
              r.ax_xb_consecutive.rotation_rms_deg, r.ax_xb_consecutive.translation_rms_mm);
   fmt::print("usable distance  {:.2f} m\n", r.usable_distance_m);
+  if (r.touch_test) print_touch_test(*r.touch_test);
   fmt::print("verdict          {}\n", r.verdict == Verdict::kAccepted ? "accepted" : "rejected");
   for (const std::string& reason : r.reasons) fmt::print("  {}\n", reason);
   // Of a rejected one it stands among the reasons.
@@ -152,6 +182,18 @@ Result<EstimatedIntrinsics> intrinsics_asked(const std::string& word, const Cali
     return failure(Fault::kUsage, "--intrinsics given: the dataset has no camera_info.yaml");
   }
   return word == "estimate" || data.intrinsics_estimated ? EstimatedIntrinsics::kWithoutK3 : EstimatedIntrinsics::kNone;
+}
+
+/// The touch test, where somebody touched the board.
+Status test_by_touch(const CalibrationDataset& data, const HandEyeOptions& options, HandEyeResult& result) {
+  if (!data.touched) return {};
+  if (data.source == CalibrationSource::kPairs) {
+    return test_hand_eye_by_touch(data.board, *data.touched, used_pairs(data.pairs, result), options.limits.touch,
+                                  result);
+  }
+  const std::vector<BoardSpec> boards = boards_of(data.targets);
+  return test_hand_eye_by_touch(boards, *data.touched, used_pairs(data.camera, boards, data.views, result),
+                                options.limits.touch, result);
 }
 
 /// The last part of a folder's name, whatever it ends with.
@@ -216,11 +258,13 @@ int run_calibrate_command(const CalibrateCommandOptions& options) {
   const auto intrinsics = intrinsics_asked(options.intrinsics, *data);
   if (!intrinsics) return fail(intrinsics.error(), kUsageError);
   hand_eye.refinement.intrinsics = *intrinsics;
-  const auto result = data->source == CalibrationSource::kPairs
-                          ? calibrate_hand_eye_from_pairs(data->pairs, hand_eye)
-                          : calibrate_hand_eye(data->camera, boards_of(data->targets), data->views, hand_eye);
+  auto result = data->source == CalibrationSource::kPairs
+                    ? calibrate_hand_eye_from_pairs(data->pairs, hand_eye)
+                    : calibrate_hand_eye(data->camera, boards_of(data->targets), data->views, hand_eye);
   if (!result) return fail_to_solve(*data, result.error());
   if (result->intrinsics) data->camera = result->camera;  // what all that is written holds for
+  if (const Status touched = test_by_touch(*data, hand_eye, *result); !touched)
+    return fail(touched.error(), kDataError);
   narrate_views(*data, *result);
   std::vector<std::string> names;
   for (const NamedTarget& target : data->targets) names.push_back(target.name);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -92,16 +93,30 @@ struct Config {
     double subset_spread_max_mm = 3.0;
     double gripper_tolerance_m = 0.01;
     double usable_distance_min_m = 0.3;
+    std::string touch_test = "no";  ///< yes: a person leads the arm's tip onto corners before the calibration counts
+    int touch_corners = 12;
+    std::string touch_tip = "estimate";            ///< given | estimate: from the touches
+    std::array<double, 3> touch_tip_m{0, 0, 0.2};  ///< of the flange
+    double touch_tip_sigma_mm = 0.5;
+    double touch_error_max_mm = 10;  ///< limits of the verdict: of the camera's place and rotation
+    double touch_error_max_mrad = 20;
     std::string stored = "none";  ///< hand_eye.yaml of an earlier run; none: no calibration is stored
     int verify_views = 3;         ///< views that a stored calibration is tested on at least
     bool operator==(const Calibration&) const = default;
   } calibration;
 
   struct Depth {
+    std::string sensor = "kinect";  ///< whose figures the fields below are where no key overrides them
     double range_min_m = 0.5;
     double range_max_m = 5.0;
     double range_trusted_m = 3.0;
+    double noise_floor_m = 0;
     double noise_at_1m_m = 0.00285;  ///< times z²
+    double baseline_m = 0.075;       ///< to the projector or second camera
+    double crop_m = 0;               ///< returns beyond it are left out; 0: none is
+    double filter_voxel_m = 0;       ///< of returns in one cube of this edge one is kept; 0: all are
+    /// Standard deviation of a depth.
+    [[nodiscard]] double sigma_m(double z_m) const { return std::hypot(noise_floor_m, noise_at_1m_m * z_m * z_m); }
     bool operator==(const Depth&) const = default;
   } depth;
 
@@ -110,7 +125,12 @@ struct Config {
     std::array<double, 3> low_m{-1.5, -1.5, -0.3};
     std::array<double, 3> high_m{1.5, 1.5, 1.5};
     double free_max_age_s = 600;
-    std::string holes = "ignore";
+    double occupied_max_age_s = 0;    ///< 0: occupied voxels stay
+    double pose_sigma_max_m = 0.001;  ///< at 1.5 m; frames of a moving camera known worse are not used
+    std::string holes = "ignore";     ///< ignore | clear_when_corroborated
+    double fine_resolution_m = 0;     ///< of a finer map of a part of the cell; 0: there is none
+    std::array<double, 3> fine_low_m{};
+    std::array<double, 3> fine_high_m{};
     std::string prior = "none";  ///< .bt or .ot of an earlier map of the cell; none: there is none
     bool operator==(const Map&) const = default;
   } map;

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include "algorithms/calibration/solvers/solver_table.hpp"
+#include "algorithms/mapping/sensor_presets.hpp"
 #include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/config/board_config.hpp"
+#include "app/machine/job_types.hpp"
 #include "platform/loop/worker_pool.hpp"
 
 namespace firstlook {
@@ -13,7 +15,7 @@ namespace {
 
 constexpr std::string_view kStartSources[] = {"pendant", "panel"};
 constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"};
-constexpr std::string_view kHoles[] = {"ignore"};
+constexpr std::string_view kHoles[] = {"ignore", "clear_when_corroborated"};
 
 /// Every seed that a double of result.json's readers can hold exactly.
 constexpr double kSeedMax = 9007199254740992.0;
@@ -197,6 +199,28 @@ void add_calibration_keys(Keys& keys, Config& c) {
                   10,
                   {},
                   "limit of the verdict: distance at which that tolerance must still hold"});
+  keys.push_back({"calibration.touch_test", &k.touch_test, 0, 0, kYesNo,
+                  "yes: before a calibration counts, a person leads the arm's tip by hand onto corners of the board"});
+  keys.push_back({"calibration.touch_corners",
+                  &k.touch_corners,
+                  3,
+                  static_cast<double>(kTouchPointsMax),
+                  {},
+                  "how many; the pendant names them"});
+  keys.push_back({"calibration.touch_tip", &k.touch_tip, 0, 0, kIntrinsics,
+                  "where the tip is on the flange. given: as touch_tip_m says; estimate: found from the touches, for "
+                  "which the arm is tilted to different sides between them"});
+  keys.push_back({"calibration.touch_tip_m", &k.touch_tip_m, -2, 2, {}, "the tip's offset in the flange, when given"});
+  keys.push_back(
+      {"calibration.touch_tip_sigma_mm", &k.touch_tip_sigma_mm, 0, 100, {}, "standard deviation of that, each axis"});
+  keys.push_back({"calibration.touch_error_max_mm",
+                  &k.touch_error_max_mm,
+                  0.01,
+                  100,
+                  {},
+                  "limit of the verdict: how far touches may put the camera from where the calibration does"});
+  keys.push_back(
+      {"calibration.touch_error_max_mrad", &k.touch_error_max_mrad, 0.01, 200, {}, "the same of its rotation"});
   keys.push_back({"calibration.stored",
                   &k.stored,
                   0,
@@ -207,7 +231,10 @@ void add_calibration_keys(Keys& keys, Config& c) {
       {"calibration.verify_views", &k.verify_views, 3, 8, {}, "views to test a stored calibration on at least"});
 }
 
-void add_map_keys(Keys& keys, Config& c) {
+void add_depth_keys(Keys& keys, Config& c) {
+  static const auto kSensors = sensor_preset_names();
+  keys.push_back({"depth.sensor", &c.depth.sensor, 0, 0, kSensors,
+                  "whose figures the other keys of this section are unless they are set; the simulated cell has it"});
   keys.push_back({"depth.range_min_m", &c.depth.range_min_m, 0.05, 5, {}, "nearest return that is used"});
   keys.push_back({"depth.range_max_m", &c.depth.range_max_m, 0.2, 20, {}, "farthest return that is used"});
   keys.push_back({"depth.range_trusted_m",
@@ -216,12 +243,31 @@ void add_map_keys(Keys& keys, Config& c) {
                   20,
                   {},
                   "returns beyond it clear the space up to it and mark nothing"});
+  keys.push_back(
+      {"depth.noise_floor_m", &c.depth.noise_floor_m, 0, 0.1, {}, "standard deviation of a return at any distance"});
   keys.push_back({"depth.noise_at_1m_m",
                   &c.depth.noise_at_1m_m,
                   0.0001,
                   0.1,
                   {},
-                  "standard deviation of a return at 1 m; grows with the square of the distance"});
+                  "its part that grows with the square of the distance, at 1 m"});
+  keys.push_back({"depth.baseline_m",
+                  &c.depth.baseline_m,
+                  0,
+                  0.5,
+                  {},
+                  "from the camera to the projector or second camera, to its right: what that does not see has no "
+                  "returns; 0: none"});
+  keys.push_back({"depth.crop_m", &c.depth.crop_m, 0, 20, {}, "farther returns neither clear nor mark; 0: all do"});
+  keys.push_back({"depth.filter_voxel_m",
+                  &c.depth.filter_voxel_m,
+                  0,
+                  0.2,
+                  {},
+                  "of the returns that end in one cube of this side one is used; 0: all are"});
+}
+
+void add_map_keys(Keys& keys, Config& c) {
   keys.push_back({"map.resolution_m", &c.map.resolution_m, 0.01, 0.2, {}, "side of a voxel"});
   keys.push_back({"map.low_m", &c.map.low_m, -10, 10, {}, "corner of the map in base"});
   keys.push_back({"map.high_m", &c.map.high_m, -10, 10, {}, "opposite corner"});
@@ -231,7 +277,30 @@ void add_map_keys(Keys& keys, Config& c) {
                   86400,
                   {},
                   "free space not seen for so long counts as unknown for motion"});
-  keys.push_back({"map.holes", &c.map.holes, 0, 0, kHoles, "what a pixel without a return says: nothing"});
+  keys.push_back({"map.occupied_max_age_s",
+                  &c.map.occupied_max_age_s,
+                  0,
+                  86400,
+                  {},
+                  "occupied voxels not seen for so long become unknown, never free; 0: they stay"});
+  keys.push_back({"map.pose_sigma_max_m",
+                  &c.map.pose_sigma_max_m,
+                  0.0001,
+                  0.1,
+                  {},
+                  "frames of a moving camera are used while the standard deviation of what they show 1.5 m ahead, for "
+                  "how well their time is known, is no larger; counts in the clearance"});
+  keys.push_back({"map.holes", &c.map.holes, 0, 0, kHoles,
+                  "what a pixel without a return says. ignore: nothing; clear_when_corroborated: free space, where two "
+                  "poses agree, the near part is known free and no return is near it"});
+  keys.push_back({"map.fine_resolution_m",
+                  &c.map.fine_resolution_m,
+                  0,
+                  0.1,
+                  {},
+                  "side of a voxel of a second, finer map of a part of the cell, fine_map.bt; 0: none"});
+  keys.push_back({"map.fine_low_m", &c.map.fine_low_m, -10, 10, {}, "corner of that part in base"});
+  keys.push_back({"map.fine_high_m", &c.map.fine_high_m, -10, 10, {}, "opposite corner"});
   keys.push_back({"map.prior",
                   &c.map.prior,
                   0,
@@ -283,10 +352,36 @@ std::vector<ConfigKey> config_keys(Config& config) {
   add_arm_keys(keys, config);
   add_space_keys(keys, config);
   add_calibration_keys(keys, config);
+  add_depth_keys(keys, config);
   add_map_keys(keys, config);
   add_margin_keys(keys, config);
   return keys;
 }
+
+void set_sensor(const SensorPreset& preset, Config::Depth& depth) {
+  depth = {std::string(preset.name), preset.range_min_m,   preset.range_max_m, preset.range_trusted_m,
+           preset.noise_floor_m,     preset.noise_at_1m_m, preset.baseline_m};
+}
+
+namespace {
+
+std::string broken_fine_map_rule(const Config::Map& m) {
+  if (m.fine_resolution_m == 0) return {};
+  if (m.fine_resolution_m < 0.005 || m.fine_resolution_m >= m.resolution_m) {
+    return "map.fine_resolution_m must be 0, or at least 0.005 and below map.resolution_m";
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (m.fine_high_m[axis] - m.fine_low_m[axis] < m.fine_resolution_m) {
+      return "map.fine_low_m must lie below map.fine_high_m by at least one fine voxel on each axis";
+    }
+    if (m.fine_low_m[axis] < m.low_m[axis] || m.fine_high_m[axis] > m.high_m[axis]) {
+      return "map.fine_low_m and map.fine_high_m must lie inside map.low_m and map.high_m";
+    }
+  }
+  return {};
+}
+
+}  // namespace
 
 std::string broken_rule(const Config& c) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -297,6 +392,11 @@ std::string broken_rule(const Config& c) {
       if (box.low_m[axis] > box.high_m[axis]) return "keep_out: low_m must not exceed high_m on any axis";
     }
   }
+  if (std::string rule = broken_fine_map_rule(c.map); !rule.empty()) return rule;
+  if (c.depth.crop_m > 0 && c.depth.crop_m <= c.depth.range_min_m) return "depth.crop_m must exceed depth.range_min_m";
+  if (c.depth.filter_voxel_m > 0 && c.depth.filter_voxel_m < 0.005) {
+    return "depth.filter_voxel_m must be 0 or at least 0.005";
+  }
   if (c.depth.range_min_m >= c.depth.range_trusted_m) return "depth.range_min_m must be below depth.range_trusted_m";
   if (c.depth.range_trusted_m > c.depth.range_max_m) return "depth.range_trusted_m must not exceed depth.range_max_m";
   if (c.calibration.views == "fixed48" && c.calibration.views_max < 52) {
@@ -305,6 +405,9 @@ std::string broken_rule(const Config& c) {
   }
   if (c.calibration.views_min > c.calibration.views_max) {
     return "calibration.views_min must not exceed calibration.views_max";
+  }
+  if (c.calibration.touch_tip == "estimate" && c.calibration.touch_corners < 4) {
+    return "calibration.touch_corners must be 4 at least when the tip is estimated";
   }
   if (const auto board = board_of(c.board); !board) return fmt::format("board: {}", board.error().detail());
   // Three views are the fewest that can determine a hand-eye transform (two motions about different axes).

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "algorithms/mapping/sensor_presets.hpp"
 #include "app/config/config.hpp"
 
 namespace firstlook {
@@ -25,6 +26,9 @@ struct ConfigKey {
 /// Every key, in the order in which they are printed; keys of one section stand together. The fields point into
 /// `config`.
 [[nodiscard]] std::vector<ConfigKey> config_keys(Config& config);
+
+/// The figures of a sensor, in place of all that `depth` holds.
+void set_sensor(const SensorPreset& preset, Config::Depth& depth);
 
 /// What single ranges cannot say: the first rule between keys that `config` breaks, in words; empty when all hold.
 [[nodiscard]] std::string broken_rule(const Config& config);

@@ -247,6 +247,17 @@ Status apply_environment(const std::vector<std::string>& environment, const std:
   return {};
 }
 
+/// Applies the sources to the defaults of the sensor that they name: any key of any source beats its figures.
+template <typename Apply>
+Result<Config> configured(Apply apply) {
+  Config named;
+  if (Status status = apply(named); !status) return std::unexpected(status.error());
+  Config config;
+  set_sensor(find_sensor_preset(named.depth.sensor).value(), config.depth);
+  if (Status status = apply(config); !status) return std::unexpected(status.error());
+  return config;
+}
+
 Status check_rules(const Config& config, std::string_view source) {
   const std::string rule = broken_rule(config);
   if (!rule.empty()) return failure(Fault::kConfigBadValue, "{}: {}", source, rule);
@@ -262,9 +273,9 @@ std::vector<std::string> process_environment() {
 }
 
 Result<Config> parse_config(std::string_view yaml, std::string_view name) {
-  Config config;
-  if (Status status = apply_yaml(yaml, name, config); !status) return std::unexpected(status.error());
-  if (Status status = check_rules(config, name); !status) return std::unexpected(status.error());
+  Result<Config> config = configured([&](Config& c) { return apply_yaml(yaml, name, c); });
+  if (!config) return config;
+  if (Status status = check_rules(*config, name); !status) return std::unexpected(status.error());
   return config;
 }
 
@@ -276,18 +287,22 @@ Result<LoadedConfig> load_config(const ConfigSources& sources) {
   } else if (std::filesystem::exists(sources.system_file, ignored)) {
     loaded.file = sources.system_file.string();
   }
-  if (!loaded.file.empty()) {
-    const Result<std::string> text = read_text_file(loaded.file, kFileBytesMax);
-    if (!text) return failure(Fault::kConfigUnreadable, "{}", text.error().detail());
-    if (Status status = apply_yaml(*text, loaded.file, loaded.config); !status) return std::unexpected(status.error());
-  }
-  const std::vector<ConfigKey> keys = config_keys(loaded.config);
-  if (Status status = apply_environment(sources.environment, keys); !status) return std::unexpected(status.error());
-  for (const ConfigOverride& flag : sources.flags) {
-    if (const Status status = apply_override(flag, keys); !status) {
-      return failure(Fault::kUsage, "{}", status.error().detail());
+  Result<std::string> text;
+  if (!loaded.file.empty()) text = read_text_file(loaded.file, kFileBytesMax);
+  if (!text) return failure(Fault::kConfigUnreadable, "{}", text.error().detail());
+  const Result<Config> config = configured([&](Config& c) -> Status {
+    if (Status status = apply_yaml(*text, loaded.file, c); !status) return status;
+    const std::vector<ConfigKey> keys = config_keys(c);
+    if (Status status = apply_environment(sources.environment, keys); !status) return status;
+    for (const ConfigOverride& flag : sources.flags) {
+      if (const Status status = apply_override(flag, keys); !status) {
+        return failure(Fault::kUsage, "{}", status.error().detail());
+      }
     }
-  }
+    return {};
+  });
+  if (!config) return std::unexpected(config.error());
+  loaded.config = *config;
   const std::string_view source = loaded.file.empty() ? std::string_view("configuration") : loaded.file;
   if (Status status = check_rules(loaded.config, source); !status) return std::unexpected(status.error());
   return loaded;

@@ -146,35 +146,43 @@ Result<std::size_t> target_of(const CornerTable& table, const CsvRow& row, std::
   return failure(Fault::kDataMalformed, "{}: no target '{:.40}' in board.yaml", table.csv.place(row), name);
 }
 
+/// The point that a row means by its number, or by column and row, which stand from column `first` on.
+Result<int> point_in_row(const CornerTable& table, const CsvRow& row, std::size_t first, const BoardSpec& board) {
+  const auto in_range = [](double x, int count) { return x >= 0 && x < count && x == std::floor(x); };
+  const auto number = table.csv.number(row, first);
+  if (!number) return std::unexpected(number.error());
+  if (table.numbered) {
+    if (in_range(*number, board.corners())) return static_cast<int>(*number);
+    return failure(Fault::kDataMalformed, "{}: point {} on a board with {}", table.csv.place(row), *number,
+                   board.corners());
+  }
+  const auto line = table.csv.number(row, first + 1);
+  if (!line) return std::unexpected(line.error());
+  if (!in_range(*number, board.inner_columns) || !in_range(*line, board.inner_rows)) {
+    return failure(Fault::kDataMalformed, "{}: corner column {} row {} on a board of {}x{}", table.csv.place(row),
+                   *number, *line, board.inner_columns, board.inner_rows);
+  }
+  return static_cast<int>(*line) * board.inner_columns + static_cast<int>(*number);
+}
+
 Result<CornerRow> corner_from(const CornerTable& table, const CsvRow& row, std::span<const NamedTarget> targets,
                               const std::optional<CameraIntrinsics>& camera) {
   const std::string place = table.csv.place(row);
   const auto target = target_of(table, row, targets);
   if (!target) return std::unexpected(target.error());
-  const BoardSpec& board = targets[*target].board;
-  std::array<double, 4> v{};
-  const std::size_t skipped = table.numbered ? 1 : 0;  // one number instead of column and row
-  for (std::size_t i = skipped; i < v.size(); ++i) {
-    const auto number = table.csv.number(row, 1 + i - skipped);
-    if (!number) return std::unexpected(number.error());
-    v[i] = *number;
-  }
-  const auto in_range = [](double x, int count) { return x >= 0 && x < count && x == std::floor(x); };
-  if (table.numbered && !in_range(v[1], board.corners())) {
-    return failure(Fault::kDataMalformed, "{}: point {} on a board with {}", place, v[1], board.corners());
-  }
-  if (!table.numbered && (!in_range(v[0], board.inner_columns) || !in_range(v[1], board.inner_rows))) {
-    return failure(Fault::kDataMalformed, "{}: corner column {} row {} on a board of {}x{}", place, v[0], v[1],
-                   board.inner_columns, board.inner_rows);
-  }
+  const auto point = point_in_row(table, row, 1, targets[*target].board);
+  if (!point) return std::unexpected(point.error());
+  const std::size_t pixel = table.numbered ? 2 : 3;
+  const auto u_px = table.csv.number(row, pixel), v_px = table.csv.number(row, pixel + 1);
+  if (!u_px) return std::unexpected(u_px.error());
+  if (!v_px) return std::unexpected(v_px.error());
   constexpr double kOutside_px = 1.0;  // refined corners may lie a little outside
-  if (camera && (v[2] < -kOutside_px || v[3] < -kOutside_px || v[2] > camera->width - 1 + kOutside_px ||
-                 v[3] > camera->height - 1 + kOutside_px)) {
+  if (camera && (*u_px < -kOutside_px || *v_px < -kOutside_px || *u_px > camera->width - 1 + kOutside_px ||
+                 *v_px > camera->height - 1 + kOutside_px)) {
     return failure(Fault::kDataMalformed, "{}: corner at ({}, {}) px lies outside the {}x{} image of camera_info.yaml",
-                   place, v[2], v[3], camera->width, camera->height);
+                   place, *u_px, *v_px, camera->width, camera->height);
   }
-  const int lines = table.numbered ? 1 : board.inner_columns;
-  return CornerRow{row.fields[0], *target, static_cast<int>(v[1]) * lines + static_cast<int>(v[0]), {v[2], v[3]}};
+  return CornerRow{row.fields[0], *target, *point, {*u_px, *v_px}};
 }
 
 /// "images/1.png", and with several targets "images/1.png, door".
@@ -313,6 +321,57 @@ Status add_views_from_images(const fs::path& folder, const std::vector<RecordedP
   return {};
 }
 
+/// The corners that the arm's tip was led onto. Columns as in corners.csv, the flange's pose as in poses.csv.
+Result<TouchRecord> read_touches(const fs::path& folder, std::span<const NamedTarget> targets) {
+  const bool numbered = targets.size() > 1 || targets.front().board.has_marker_corners();
+  std::vector<std::string_view> columns = {"x", "y", "z", "qx", "qy", "qz", "qw"};
+  if (numbered) columns.emplace_back("point");
+  if (!numbered) columns.insert(columns.end(), {"column", "row"});
+  if (targets.size() > 1) columns.emplace_back("target");
+  const auto csv = read_csv(folder / "touches.csv", columns);
+  if (!csv) return std::unexpected(csv.error());
+  const CornerTable table{*csv, numbered, targets.size() > 1};
+  TouchRecord record;
+  std::optional<std::size_t> touched;
+  for (const CsvRow& row : csv->rows) {
+    const auto target = target_of(table, row, targets);
+    if (!target) return std::unexpected(target.error());
+    if (touched.value_or(*target) != *target) {
+      return failure(Fault::kDataMalformed, "{}: a second target; the touch test takes one", csv->place(row));
+    }
+    touched = *target;
+    const auto pose = pose_from(*csv, row, 0);
+    if (!pose) return std::unexpected(pose.error());
+    const auto corner = point_in_row(table, row, 7, targets[*target].board);
+    if (!corner) return std::unexpected(corner.error());
+    record.touches.push_back({Transform<Base, Flange>(*pose), *corner});
+  }
+  if (record.touches.empty()) return failure(Fault::kDataMalformed, "{}: no touches", csv->file);
+  if (record.touches.size() > kTouchesMax) {
+    return failure(Fault::kDataMalformed, "{}: {} touches, at most {} are taken", csv->file, record.touches.size(),
+                   kTouchesMax);
+  }
+  record.target = static_cast<int>(*touched);
+  if (is_there(folder / "tip.yaml")) {
+    const auto tip = read_tip(folder / "tip.yaml");
+    if (!tip) return std::unexpected(tip.error());
+    record.tip = *tip;
+  }
+  return record;
+}
+
+/// touches.csv, when there is one.
+Status add_touches(const fs::path& folder, std::span<const NamedTarget> targets, CalibrationDataset& data) {
+  if (!is_there(folder / "touches.csv")) {
+    if (is_there(folder / "tip.yaml")) data.notes.emplace_back("tip.yaml: not used, there is no touches.csv");
+    return {};
+  }
+  auto touched = read_touches(folder, targets);
+  if (!touched) return std::unexpected(touched.error());
+  data.touched = std::move(*touched);
+  return {};
+}
+
 Result<CalibrationDataset> read_pair_dataset(const fs::path& folder) {
   CalibrationDataset data;
   data.source = CalibrationSource::kPairs;
@@ -320,6 +379,11 @@ Result<CalibrationDataset> read_pair_dataset(const fs::path& folder) {
     const auto board = read_board(folder / "board.yaml");
     if (!board) return std::unexpected(board.error());
     data.board = *board;
+    const std::vector<NamedTarget> alone = {{std::string(), *board}};
+    if (const Status added = add_touches(folder, alone, data); !added) return std::unexpected(added.error());
+  } else if (is_there(folder / "touches.csv")) {
+    return failure(Fault::kDataMissing, "{}: touches.csv needs it, for the board's size",
+                   (folder / "board.yaml").string());
   }
   auto pairs = read_pairs(folder / "pairs.csv");
   if (!pairs) return std::unexpected(pairs.error());
@@ -416,6 +480,9 @@ Result<CalibrationDataset> read_calibration_dataset(const fs::path& folder, cons
                                      [](const NamedTarget& t) { return !t.board.is_orientation_unique(); });
   if (!with_corners && any_flips) settle_flips(data);
   note_rare_targets(data);
+  if (const Status touched = add_touches(folder, data.targets, data); !touched) {
+    return std::unexpected(touched.error());
+  }
   return data;
 }
 

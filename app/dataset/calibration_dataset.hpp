@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/calibration/calibration_view.hpp"
+#include "algorithms/calibration/verdict.hpp"
 #include "algorithms/vision/target_set.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/result.hpp"
@@ -35,13 +35,16 @@ struct CalibrationDataset {
   std::vector<std::string> names;   ///< one for each view
   std::vector<std::string> images;  ///< the picture that each view is of; those of one picture are one station
   std::vector<PosePair> pairs;
-  std::vector<std::string> notes;  ///< for people: images left out and why
+  std::optional<TouchRecord> touched;  ///< touches.csv with tip.yaml
+  std::vector<std::string> notes;      ///< for people: images left out and why
 };
 
 /// Reads the folder; corners.csv is preferred to images, pairs.csv is used when there is no poses.csv. Images in which
 /// the board is not found are left out with a note. With several targets (board.yaml with a list `boards`) each picture
 /// gives a view of each target that it shows, and corners.csv has a column `target` with the name. Quaternions within
-/// 1e-3 of unit length are normalised, others refused.
+/// 1e-3 of unit length are normalised, others refused. touches.csv, when it is there, has a row for each corner that
+/// the arm's tip was led onto: `column,row` (or `point`, and with several targets `target`) and base_T_flange; tip.yaml
+/// says where the tip is on the flange, without it that is estimated.
 /// @return kDataMissing or kDataMalformed, naming file and line
 [[nodiscard]] Result<CalibrationDataset> read_calibration_dataset(const std::filesystem::path& folder,
                                                                   const DetectionOptions& detection = {});
@@ -51,6 +54,10 @@ struct CalibrationDataset {
 [[nodiscard]] Result<std::vector<NamedTarget>> read_targets(const std::filesystem::path& file);
 /// The same for a file of one target. @return also kDataMalformed for several
 [[nodiscard]] Result<BoardSpec> read_board(const std::filesystem::path& file);
+
+/// tip.yaml: `flange_p_tip_m: [x, y, z]`, and `sigma_m`, for each axis, when it is not the usual one.
+/// @return kDataMissing, kDataMalformed
+[[nodiscard]] Result<TipOffset> read_tip(const std::filesystem::path& file);
 
 /// The text of a board.yaml.
 [[nodiscard]] std::string board_yaml(const BoardSpec& board);

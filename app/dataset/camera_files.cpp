@@ -133,6 +133,30 @@ CameraIntrinsics parse_camera_info(const YAML::Node& root) {
   return camera;
 }
 
+TipOffset parse_tip(const YAML::Node& root) {
+  for (const auto& entry : root) {
+    const auto key = entry.first.as<std::string>();
+    if (key != "flange_p_tip_m" && key != "sigma_m") {
+      throw Complaint{entry.first.Mark().line + 1, fmt::format("unknown key '{}': flange_p_tip_m, sigma_m", key)};
+    }
+  }
+  const auto at = value_of<std::vector<double>>(root, "flange_p_tip_m");
+  const int line = root["flange_p_tip_m"].Mark().line + 1;
+  if (at.size() != 3) throw Complaint{line, fmt::format("flange_p_tip_m has {} numbers instead of 3", at.size())};
+  TipOffset tip;
+  tip.flange_p_tip_m = {at[0], at[1], at[2]};
+  if (root["sigma_m"]) tip.sigma_m = value_of<double>(root, "sigma_m");
+  constexpr double kTipMax_m = 2;  // no tool is longer
+  if (!(tip.flange_p_tip_m.norm() <= kTipMax_m)) {
+    throw Complaint{
+        line, fmt::format("a tip {:.0f} m from the flange: that looks like millimetres", tip.flange_p_tip_m.norm())};
+  }
+  if (!(tip.sigma_m >= 0 && tip.sigma_m <= 0.1)) {
+    throw Complaint{root["sigma_m"].Mark().line + 1, "sigma_m must lie in [0, 0.1]"};
+  }
+  return tip;
+}
+
 }  // namespace
 
 std::string board_yaml(const BoardSpec& board) {
@@ -161,6 +185,8 @@ Result<BoardSpec> read_board(const std::filesystem::path& file) {
   if (targets->size() == 1) return targets->front().board;
   return failure(Fault::kDataMalformed, "{}: {} boards where one is wanted", file.filename().string(), targets->size());
 }
+
+Result<TipOffset> read_tip(const std::filesystem::path& file) { return load<TipOffset>(file, parse_tip); }
 
 Result<CameraIntrinsics> read_camera_info(const std::filesystem::path& file) {
   return load<CameraIntrinsics>(file, parse_camera_info);

@@ -66,7 +66,8 @@ Result<BoardPlane> Workbench::plane_of(const hal::Frame& frame, const Transform<
   const ImageView<std::uint16_t> pixels{depth_pixels_.items().data(), camera.width, camera.height};
   if (const Status read = depth_.read(frame, pixels); !read) return std::unexpected(read.error());
   BoardPlaneOptions options;
-  options.noise_at_1m = config_.depth.noise_at_1m_m;
+  options.noise_at_1m =
+      config_.depth.sigma_m(config_.depth.range_min_m) / (config_.depth.range_min_m * config_.depth.range_min_m);
   const DepthImage image{{pixels.data, pixels.width, pixels.height}, depth_.units_per_m()};
   return find_board_plane(image, camera, board_, facts_.camera_T_depth.inverse() * camera_T_board, options);
 }

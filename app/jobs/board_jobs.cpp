@@ -69,7 +69,10 @@ BoardSight Workbench::sight_of(const DetectArguments& arguments) {
   if (auto picture = judge_standing(found)) {
     sight.still = picture->still;
     sight.moved_px = picture->moved_px;
-    if (sight.still || arguments.looks >= kLooksMax) sight.picture = std::move(*picture);
+    if (sight.still || arguments.looks >= kLooksMax) {
+      sight.picture = std::move(*picture);
+      sight.frames = std::move(found);
+    }
   } else {
     sight.still = false;
     sight.moved_px = kFramesAgree_px;  // at least: average_corners found no two alike
@@ -132,6 +135,7 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     o.residual_rms_px = pose->residual_rms_px;
     o.settling = {static_cast<int>(arguments.looks), sight.moved_px, sight.picture->scatter_px, sight.still};
     o.plane = plane_beside(arguments, *pose);
+    o.frames = sight.frames;
     keep_picture(observations_.size());
     observations_.push_back(std::move(o));
     settle_observations(arguments.purpose);

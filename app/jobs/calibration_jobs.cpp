@@ -52,6 +52,8 @@ HandEyeOptions Workbench::solve_options() const {
   limits.voxel_size_m = config_.map.resolution_m;
   limits.tolerance_m = config_.calibration.gripper_tolerance_m;
   limits.usable_distance_min_m = config_.calibration.usable_distance_min_m;
+  limits.touch.error_max_m = config_.calibration.touch_error_max_mm * 1e-3;
+  limits.touch.error_max_rad = config_.calibration.touch_error_max_mrad * 1e-3;
   return options;
 }
 
@@ -198,7 +200,10 @@ ValidateResult Workbench::validate() {
   result.accepted = hand_eye_->verdict == Verdict::kAccepted;
   result.holdout_rms_px = hand_eye_->holdout_rms_px;
   result.usable_distance_m = hand_eye_->usable_distance_m;
-  if (result.accepted) {
+  if (result.accepted && tests_by_touch()) {
+    hand_eye_->verdict = Verdict::kRejected;  // until somebody has touched the board
+    hand_eye_->reasons = {"the touch test was not carried on"};
+  } else if (result.accepted) {
     begin_mapping();
     result.clearance_m = mapping_terms_->voxels_m;
   }

@@ -71,6 +71,9 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
       return run<FromHere>(request, result, failed_, [&b](const FromHere& a) { return b.next_verification_view(a); });
     case JobKind::kVerifyCalibration:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.verify_calibration(); });
+    case JobKind::kTouchTest:
+      return run<TouchTestArguments>(request, result, failed_,
+                                     [&b](const TouchTestArguments& a) { return b.touch_test(a); });
     case JobKind::kSummarize:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.summarize(); });
     case JobKind::kForgetKnownFree:
@@ -104,6 +107,7 @@ Duration virtual_duration(JobKind kind) {
     case JobKind::kValidate:
       return milliseconds(1500);
     case JobKind::kVerifyCalibration:
+    case JobKind::kTouchTest:
       return milliseconds(50);
     case JobKind::kIntegrate:
     case JobKind::kForgetKnownFree:

@@ -1,33 +1,33 @@
 /// Jobs of the map: a depth frame goes in, and at the end what remains unknown is named.
 #include <algorithm>
 
+#include "algorithms/kinematics/sight_uncertainty.hpp"
 #include "algorithms/mapping/remaining.hpp"
 #include "algorithms/mapping/self_filter.hpp"
 #include "app/jobs/workbench.hpp"
 #include "platform/journal/journal.hpp"
 
 namespace firstlook {
+namespace {
+
+constexpr double kPoseRange_m = 1.5;  // where the uncertainty of a pose is asked for, as in the clearance of rule 5
+
+}  // namespace
+
 IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   IntegrateResult result;
   result.at_view = arguments.at_view;
-  const CameraIntrinsics& camera = depth_.intrinsics();
-  const ImageView<std::uint16_t> pixels{depth_pixels_.items().data(), camera.width, camera.height};
-  const double stamp_s = arguments.frame.frame.stamp.seconds();
-  const LinkFrames frames = forward(arm_, arguments.frame.at_rad);
-  const auto base_T_depth = frames.flange() * hand_eye_->flange_T_camera * camera_T_depth();
-
-  if (depth_.read(arguments.frame.frame, pixels) && !is_frozen(arguments.frame.frame, result)) {
-    const Capsules body = place(camera_body_.capsules, frames);
-    render_self_depth(std::span<const Capsule>(body.data(), body.size()), kSelfPadding_m, base_T_depth, camera,
-                      self_depth_.items());
-    const double units_per_m = depth_.units_per_m() * alignment_.depth_camera.mount.depth_scale;
-    const DepthImage depth{{pixels.data, pixels.width, pixels.height}, units_per_m};
-    if (inserter_.insert(map_, depth, base_T_depth, self_depth_.items(), stamp_s)) {
-      result.used = true;
-      ++frames_integrated_;
-    }
+  const std::optional<FrameFlaw> flaw = insert_frame(arguments.frame);
+  result.used = !flaw;
+  result.frozen = flaw == FrameFlaw::kFrozen;
+  if (flaw) {
+    ++frames_refused_[static_cast<std::size_t>(*flaw)];
+  } else {
+    ++frames_integrated_;
   }
-  if (!result.used) ++frames_dropped_;
+  if (config_.map.occupied_max_age_s > 0) {
+    occupied_forgotten_ += map_.forget_old_occupied(arguments.now_s, config_.map.occupied_max_age_s);
+  }
   last_stamp_s_ = std::max(last_stamp_s_, arguments.now_s);
   rebuild_free_space(last_stamp_s_);
   result.path_free = route_is_certified(arguments.arm_rad, arguments.ahead);
@@ -43,9 +43,54 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   return result;
 }
 
+/// Puts a frame into the map, or says why not.
+std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
+  const CameraIntrinsics& camera = depth_.intrinsics();
+  const DepthSensor& sensor = inserter_.sensor();
+  if (camera.width != sensor.intrinsics.width || camera.height != sensor.intrinsics.height)
+    return FrameFlaw::kWrongSize;
+  const ImageView<std::uint16_t> pixels{depth_pixels_.items().data(), camera.width, camera.height};
+  if (!depth_.read(posed.frame, pixels)) return FrameFlaw::kUnreadable;
+  const LinkFrames frames = forward(arm_, posed.at_rad);
+  const auto base_T_depth = frames.flange() * hand_eye_->flange_T_camera * camera_T_depth();
+  const double stamp_s = posed.frame.stamp.seconds();
+  const double units_per_m = depth_.units_per_m() * alignment_.depth_camera.mount.depth_scale;
+  if (const auto flaw = gate_.inspect(pixels, units_per_m, base_T_depth, stamp_s)) return flaw;
+  if (is_frozen(posed.frame)) return FrameFlaw::kFrozen;
+  if (pose_sigma_m(posed, frames) > config_.map.pose_sigma_max_m) return FrameFlaw::kPoseUncertain;
+
+  const Capsules body = place(camera_body_.capsules, frames);
+  render_self_depth(std::span<const Capsule>(body.data(), body.size()), kSelfPadding_m, base_T_depth, camera,
+                    self_depth_.items());
+  const DepthImage depth{{pixels.data, pixels.width, pixels.height}, units_per_m};
+  if (open_rays_) open_rays_->look(depth, self_depth_.items());
+  if (filter_) {
+    const DepthFilterResult left_out = filter_->apply(pixels, units_per_m, base_T_depth);
+    pixels_left_out_ += left_out.pixels_cropped + left_out.pixels_thinned;
+  }
+  // What is left to refuse is a pose farther away than any arm reaches.
+  if (!inserter_.insert(map_, depth, base_T_depth, self_depth_.items(), stamp_s)) return FrameFlaw::kBadPose;
+  if (fine_map_ && !fine_inserter_->insert(*fine_map_, depth, base_T_depth, self_depth_.items(), stamp_s))
+    return FrameFlaw::kBadPose;
+  if (open_rays_) {
+    const OpenRaysResult open = open_rays_->clear(map_, base_T_depth, {inserter_.missed(), inserter_.hit()}, stamp_s,
+                                                  config_.map.free_max_age_s);
+    holes_record_.pixels_open += open.pixels_open;
+    holes_record_.voxels_cleared += open.voxels_cleared;
+  }
+  return std::nullopt;
+}
+
+double Workbench::pose_sigma_m(const PosedFrame& posed, const LinkFrames& frames) const {
+  const auto flange_T_depth = hand_eye_->flange_T_camera * camera_T_depth();
+  return sight_sigma_m(
+      frames, flange_T_depth * Eigen::Vector3d(0, 0, kPoseRange_m),
+      {posed.velocity_rad_s, posed.reports_apart_s, alignment_.depth_stamps.sigma_s, config_.arm.acceleration_rad_s2});
+}
+
 /// A camera that hangs may go on sending the last picture with new stamps. Noise keeps a living one from repeating a
 /// picture, but not from repeating the few pixels that a view into the open returns: those prove nothing.
-bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
+bool Workbench::is_frozen(const hal::Frame& frame) {
   const std::span<const std::uint16_t> pixels = depth_pixels_.items();
   const std::uint64_t hash = [&] {
     Fnv1a sum;
@@ -55,9 +100,9 @@ bool Workbench::is_frozen(const hal::Frame& frame, IntegrateResult& result) {
   constexpr std::ptrdiff_t kTellingShare = 100;  // one pixel of so many: 3072 of 640x480
   const auto returns = std::count_if(pixels.begin(), pixels.end(), [](std::uint16_t z) { return z != 0; });
   const bool tells = returns * kTellingShare >= std::ssize(pixels);
-  result.frozen = tells && last_picture_ && last_picture_->second == hash && last_picture_->first != frame.sequence;
+  const bool frozen = tells && last_picture_ && last_picture_->second == hash && last_picture_->first != frame.sequence;
   last_picture_ = {frame.sequence, hash};
-  return result.frozen;
+  return frozen;
 }
 
 /// A look becomes a row of the record; of frames on the way the last one waits to become the row "end".

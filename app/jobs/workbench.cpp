@@ -20,14 +20,32 @@ constexpr double kSlowSpeed_m_s = 0.05;   // stops within 1.3 mm instead of 16.5
 
 DepthSensor sensor_of(const Config& config, const hal::DepthCamera& camera) {
   return {camera.intrinsics(), config.depth.range_min_m, config.depth.range_max_m, config.depth.range_trusted_m,
-          config.depth.noise_at_1m_m};
+          config.depth.baseline_m};
+}
+
+VoxelMap::Planes planes_of(const Config& config) {
+  return config.map.holes == "ignore" ? VoxelMap::Planes::kAll : VoxelMap::Planes::kWithOpenRays;
 }
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
+GridGeometry fine_geometry(const Config& config) {
+  return GridGeometry::covering(vector_of(config.map.fine_low_m), vector_of(config.map.fine_high_m),
+                                config.map.fine_resolution_m);
+}
+
+std::size_t fine_map_bytes(const Config& config) {
+  return config.map.fine_resolution_m > 0
+             ? VoxelMap::required_bytes(fine_geometry(config), VoxelMap::Planes::kLogOddsOnly)
+             : 0;
+}
+
+DepthFilterOptions filter_of(const Config& config) { return {config.depth.crop_m, config.depth.filter_voxel_m}; }
+
 ClearanceInputs clearance_inputs(const Config& config) {
   ClearanceInputs in;
   in.voxel_m = config.map.resolution_m;
+  in.sigma_depth_floor_m = config.depth.noise_floor_m;
   in.sigma_depth_at_1m_m = config.depth.noise_at_1m_m;
   in.sigma_tracking_m = config.clearance.tracking_sigma_m;
   in.payload_sag_m = config.clearance.sag_m;
@@ -54,11 +72,12 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
   const std::size_t prior_bytes =
       has_prior ? VoxelMap::required_bytes(geometry, VoxelMap::Planes::kLogOddsOnly) + GainModel::prior_bytes(geometry)
                 : 0;
-  const std::size_t needed = VoxelMap::required_bytes(geometry) + 3 * geometry.count() + prior_bytes;
+  const std::size_t needed = VoxelMap::required_bytes(geometry, planes_of(config)) + 3 * geometry.count() +
+                             fine_map_bytes(config) + prior_bytes;
   if (needed > memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) {
-    return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m need {:.1f} MiB, the budget holds {:.1f} MiB",
+    return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m{} need {:.1f} MiB, the budget holds {:.1f} MiB",
                    geometry.size.x(), geometry.size.y(), geometry.size.z(), geometry.resolution_m,
-                   static_cast<double>(needed) / memory::kMiB,
+                   fine_map_bytes(config) > 0 ? " and the finer map" : "", static_cast<double>(needed) / memory::kMiB,
                    static_cast<double>(memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) / memory::kMiB);
   }
   std::optional<VoxelMap> prior;
@@ -87,8 +106,9 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       envelope_body_(body_with_envelope(arm, config.camera_envelope_radius_m)),
       camera_body_(envelope_body_),
       blind_terms_(required_clearance(clearance_inputs(config))),
-      map_(geometry),
+      map_(geometry, planes_of(config)),
       inserter_(geometry, sensor_of(config, depth)),
+      gate_(sensor_of(config, depth)),
       field_(geometry, kFieldMax_m),
       free_mask_(geometry.count(), 0),
       zone_(geometry.count(), 0),
@@ -97,6 +117,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
                config.explore.certificate_samples),
       swept_log_odds_(geometry.count(), kUnknownLogOdds),
       published_(geometry, kFieldMax_m) {
+  take_options();
   map_.set_safe_zone(zone_cylinder_);
   for (const Capsule& capsule : arm_.body) {
     if (capsule.link == 0) map_.note_fixed_body(capsule, kSelfPadding_m);
@@ -110,6 +131,18 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
   published_.take();
 }
 
+/// What is off by default.
+void Workbench::take_options() {
+  const GridGeometry& g = map_.geometry();
+  const DepthSensor& sensor = inserter_.sensor();
+  holes_record_.policy = config_.map.holes;
+  if (config_.map.holes != "ignore") open_rays_.emplace(g, sensor);
+  if (filter_of(config_).is_on()) filter_.emplace(g, sensor, filter_of(config_));
+  if (config_.map.fine_resolution_m == 0) return;
+  fine_map_.emplace(fine_geometry(config_), VoxelMap::Planes::kLogOddsOnly);
+  fine_inserter_.emplace(fine_map_->geometry(), sensor);
+}
+
 Status Workbench::take_memory() {
   const GridGeometry& g = map_.geometry();
   const auto account = [this](memory::Pool pool, std::size_t bytes) -> Status {
@@ -119,6 +152,9 @@ Status Workbench::take_memory() {
     return {};
   };
   const DepthSensor& sensor = inserter_.sensor();
+  const std::size_t options = (open_rays_ ? OpenRays::required_bytes(g, sensor) : 0) +
+                              (filter_ ? DepthFilter::required_bytes(g, sensor, filter_of(config_)) : 0) +
+                              (fine_map_ ? Inserter::required_bytes(fine_map_->geometry(), sensor) : 0);
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
   const std::size_t point = sizeof(Eigen::Vector2d) + (board_.allows_partial_views() ? sizeof(int) : 0);
@@ -126,10 +162,10 @@ Status Workbench::take_memory() {
   const std::size_t way_sight = sizeof(WaySight) + decltype(WayArguments::joints)::capacity() * sizeof(JointSample) +
                                 static_cast<std::size_t>(board_.corners()) * point;
   for (const auto& [pool, bytes] : {
-           std::pair{memory::Pool::kVoxelPlanes,
-                     VoxelMap::required_bytes(g) + 3 * g.count() + (prior_ ? 2 * g.count() : 0)},
+           std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g, planes_of(config_)) + 3 * g.count() +
+                                                     fine_map_bytes(config_) + (prior_ ? 2 * g.count() : 0)},
            std::pair{memory::Pool::kDistanceField,
-                     2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor)},
+                     2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor) + options},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
            std::pair{memory::Pool::kViewCandidates, ViewChooser::required_bytes(g, config_.explore.candidates, 2,
                                                                                 config_.explore.certificate_samples)},
@@ -196,7 +232,7 @@ void Workbench::begin_mapping() {
   in.sigma_depth_camera_m = depth_camera.head<3>().maxCoeff();
   in.sigma_depth_camera_rad = depth_camera.segment<3>(3).maxCoeff();
   in.sigma_depth_scale = depth_camera[6];
-  in.sigma_tracking_m = std::hypot(in.sigma_tracking_m, in.speed_m_s * alignment_.depth_stamps.sigma_s);
+  in.sigma_tracking_m = std::hypot(in.sigma_tracking_m, config_.map.pose_sigma_max_m);
   mapping_terms_ = required_clearance(in);
   in.speed_m_s = std::min(kSlowSpeed_m_s, in.speed_m_s);
   slow_terms_ = required_clearance(in);

@@ -11,9 +11,12 @@
 #include "algorithms/calibration/view_design.hpp"
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/kinematics/speed.hpp"
+#include "algorithms/mapping/depth_filter.hpp"
 #include "algorithms/mapping/distance_field.hpp"
+#include "algorithms/mapping/frame_gate.hpp"
 #include "algorithms/mapping/insertion.hpp"
 #include "algorithms/mapping/map_change.hpp"
+#include "algorithms/mapping/open_rays.hpp"
 #include "algorithms/motion/body.hpp"
 #include "algorithms/motion/clearance.hpp"
 #include "algorithms/motion/planner.hpp"
@@ -51,6 +54,7 @@ struct Observation {
   double residual_rms_px = 0;
   SettlingRecord settling;
   std::optional<BoardPlane> plane;  ///< of the board in depth frames of this stop
+  std::vector<CornerSet> frames;    ///< that `view` is the mean of
 };
 
 /// What was seen of the board on the way between two stops.
@@ -66,6 +70,7 @@ struct WaySight {
 /// What the frames of one look show.
 struct BoardSight {
   std::optional<StandingPicture> picture;  ///< empty: no board to be used
+  std::vector<CornerSet> frames;           ///< those that show it
   bool still = true;
   double moved_px = 0;
 };
@@ -90,6 +95,7 @@ class Workbench {
   [[nodiscard]] CalibrationViewResult next_calibration_view(const FromHere& here);
   [[nodiscard]] SolveResult solve();
   [[nodiscard]] ValidateResult validate();
+  [[nodiscard]] TouchTestResult touch_test(const TouchTestArguments& arguments);
   [[nodiscard]] VerificationViewResult next_verification_view(const FromHere& here);
   [[nodiscard]] VerifyResult verify_calibration();
   [[nodiscard]] IntegrateResult integrate(const IntegrateArguments& arguments);
@@ -114,6 +120,8 @@ class Workbench {
   [[nodiscard]] const CellFacts& facts() const { return facts_; }
   [[nodiscard]] const std::vector<RemainingRecord>& remaining() const { return remaining_; }
   [[nodiscard]] const VoxelMap& map() const { return map_; }
+  /// Of a part of the cell (map.fine_resolution_m); nothing moves by it. Null when there is none.
+  [[nodiscard]] const VoxelMap* fine_map() const { return fine_map_ ? &*fine_map_ : nullptr; }
   [[nodiscard]] bool swept() const { return !sweeping_; }
   /// The classes of the map as the sweep left it; all unknown when the sweep did not end.
   [[nodiscard]] VoxelMap map_after_sweep() const;
@@ -122,7 +130,11 @@ class Workbench {
   [[nodiscard]] std::optional<MapChange> change_since_prior() const;
   [[nodiscard]] bool mapped() const { return frames_integrated_ > 0; }
   [[nodiscard]] std::uint64_t frames_integrated() const { return frames_integrated_; }
-  [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
+  [[nodiscard]] const FlawCounts& frames_refused() const { return frames_refused_; }
+  [[nodiscard]] std::uint64_t infinite_pixels() const { return gate_.infinite_pixels(); }
+  [[nodiscard]] const HolesRecord& holes() const { return holes_record_; }
+  [[nodiscard]] std::uint64_t occupied_forgotten() const { return occupied_forgotten_; }
+  [[nodiscard]] std::uint64_t pixels_left_out() const { return pixels_left_out_; }
   /// Where the camera stood at each of `mapping_views()`; the outermost corners of the board. For pictures.
   [[nodiscard]] std::vector<CameraPlace> camera_places() const;
   [[nodiscard]] std::optional<std::array<Eigen::Vector3d, 4>> board_outline_m() const;
@@ -137,6 +149,7 @@ class Workbench {
   Workbench(const Config& config, const CellFacts& facts, const ArmModel& arm, hal::ColorCamera& color,
             hal::DepthCamera& depth, WorkerPool& workers, const GridGeometry& geometry);
   [[nodiscard]] Status take_memory();
+  void take_options();
 
   [[nodiscard]] const Body& body_of(MotionPhase phase) const;
   [[nodiscard]] FreeSpace space_of(MotionPhase phase) const;
@@ -187,11 +200,16 @@ class Workbench {
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
   [[nodiscard]] std::vector<CalibrationView> views() const;
+  [[nodiscard]] bool tests_by_touch() const { return config_.calibration.touch_test == "yes"; }
+  [[nodiscard]] TouchRecord touch_record(const TouchTestArguments& arguments) const;
+  [[nodiscard]] std::vector<PosePair> repeated_looks() const;
   [[nodiscard]] HandEyeClaim claim() const;
   [[nodiscard]] std::optional<Path> best_verification_view(const FromHere& here, const ViewDesignModel& model,
                                                            const Matrix12d& information);
   [[nodiscard]] std::optional<Path> next_turn(const FromHere& here);
-  [[nodiscard]] bool is_frozen(const hal::Frame& frame, IntegrateResult& result);
+  [[nodiscard]] std::optional<FrameFlaw> insert_frame(const PosedFrame& posed);
+  [[nodiscard]] bool is_frozen(const hal::Frame& frame);
+  [[nodiscard]] double pose_sigma_m(const PosedFrame& posed, const LinkFrames& frames) const;
   void begin_mapping();
   void rebuild_free_space(double now_s);
   void publish_blind(double now_s);
@@ -238,6 +256,11 @@ class Workbench {
 
   VoxelMap map_;
   Inserter inserter_;
+  FrameGate gate_;
+  std::optional<OpenRays> open_rays_;  ///< with map.holes: clear_when_corroborated
+  std::optional<DepthFilter> filter_;  ///< with depth.crop_m or depth.filter_voxel_m
+  std::optional<VoxelMap> fine_map_;   ///< with map.fine_resolution_m
+  std::optional<Inserter> fine_inserter_;
   DistanceField field_;
   std::vector<std::uint8_t> free_mask_;
   std::vector<std::uint8_t> zone_;
@@ -255,7 +278,10 @@ class Workbench {
   bool sweeping_ = true;
   double expected_gain_ = 0;
   std::uint64_t frames_integrated_ = 0;
-  std::uint64_t frames_dropped_ = 0;
+  FlawCounts frames_refused_{};
+  HolesRecord holes_record_;
+  std::uint64_t occupied_forgotten_ = 0;
+  std::uint64_t pixels_left_out_ = 0;
   std::uint64_t unknown_before_ = 0;   ///< the last frame
   std::uint64_t unknown_at_view_ = 0;  ///< after the last view
   std::vector<MappingViewRecord> mapping_views_;

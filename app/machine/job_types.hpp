@@ -31,8 +31,9 @@ enum class JobKind : std::uint16_t {
   kNextVerificationView,
   kVerifyCalibration,
   kSeeOnTheWay,
+  kTouchTest,
 };
-inline constexpr JobKind kLastJobKind = JobKind::kSeeOnTheWay;
+inline constexpr JobKind kLastJobKind = JobKind::kTouchTest;
 
 /// What people read: "choosing the next view".
 [[nodiscard]] constexpr std::string_view name_of(JobKind kind) {
@@ -53,7 +54,8 @@ inline constexpr JobKind kLastJobKind = JobKind::kSeeOnTheWay;
       "forgetting what was known free",
       "choosing the next view to test the calibration from",
       "testing the stored calibration",
-      "looking at the board on the way"};
+      "looking at the board on the way",
+      "comparing touches with the calibration"};
   return kNames[static_cast<std::size_t>(kind) - 1];
 }
 
@@ -135,9 +137,11 @@ struct PlanResult {
 struct PosedFrame {
   hal::Frame frame;
   JointVector at_rad;
+  JointVector velocity_rad_s{};  ///< between the reports before and after the stamp
+  double reports_apart_s = 0;    ///< of these two
   template <typename Archive>
   void fields(Archive& a) {
-    a(frame.stamp, frame.sequence, frame.slot, at_rad);
+    a(frame.stamp, frame.sequence, frame.slot, at_rad, velocity_rad_s, reports_apart_s);
   }
 };
 
@@ -259,6 +263,42 @@ struct ValidateResult {
   template <typename Archive>
   void fields(Archive& a) {
     a(accepted, holdout_rms_px, usable_distance_m, clearance_m);
+  }
+};
+
+/// Corners that a touch test takes at most.
+inline constexpr std::size_t kTouchPointsMax = 20;
+
+/// kTouchTest: where the arm's joints were while its tip stood on a point of the board.
+struct TouchedPoint {
+  std::int32_t point = 0;
+  JointVector at_rad;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(point, at_rad);
+  }
+};
+struct TouchTestArguments {
+  FixedVector<TouchedPoint, kTouchPointsMax> touches;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(touches);
+  }
+};
+
+struct TouchTestResult {
+  bool usable = false;  ///< false: `fault` says why there is nothing to compare with
+  Fault fault = Fault::kInternal;
+  bool agrees = false;
+  double residual_rms_mm = 0;  ///< of the touches, after Horn
+  double error_mm = 0;         ///< of the camera, mean over the views
+  double error_mrad = 0;
+  double chi2 = 0;
+  double chi2_limit = 0;
+  double clearance_m = 0;  ///< of safety rule 5, with this calibration; 0 when it does not agree
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(usable, fault, agrees, residual_rms_mm, error_mm, error_mrad, chi2, chi2_limit, clearance_m);
   }
 };
 

@@ -177,32 +177,52 @@ void Machine::remember_arm(const ArmReported& report) {
   arm_known_ = true;
 }
 
-std::optional<JointVector> Machine::joints_at(Instant stamp) const {
+std::optional<PosedFrame> Machine::posed(const hal::Frame& frame) const {
   for (std::size_t i = history_size_; i-- > 1;) {
     const hal::ArmState& before = history_[i - 1];
     const hal::ArmState& after = history_[i];
-    if (before.stamp <= stamp && stamp <= after.stamp && before.stamp < after.stamp) {
-      const double t = (stamp - before.stamp).seconds() / (after.stamp - before.stamp).seconds();
-      return interpolate(before.position_rad, after.position_rad, t);
+    if (before.stamp <= frame.stamp && frame.stamp <= after.stamp && before.stamp < after.stamp) {
+      const double apart_s = (after.stamp - before.stamp).seconds();
+      const double t = (frame.stamp - before.stamp).seconds() / apart_s;
+      return PosedFrame{frame, interpolate(before.position_rad, after.position_rad, t),
+                        (after.position_rad - before.position_rad) * (1 / apart_s), apart_s};
     }
+  }
+  return std::nullopt;
+}
+
+std::optional<JointVector> Machine::stood_at(double for_s) const {
+  constexpr double kStill_rad = 3e-4;  // 15 sigmas of an encoder; a hand that holds the arm moves it by more
+  JointVector sum = JointVector::zero(arm_.position_rad.size());
+  int count = 0;
+  for (std::size_t i = history_size_; i-- > 0;) {
+    const hal::ArmState& state = history_[i];
+    if ((state.position_rad - arm_.position_rad).max_abs() > kStill_rad) return std::nullopt;
+    sum = sum + state.position_rad;
+    ++count;
+    if (now_ - state.stamp >= seconds(for_s)) return sum * (1.0 / count);
   }
   return std::nullopt;
 }
 
 /// The oldest of the frames whose stamps the arm has reached, when its joints there are known.
 template <typename Frames>
-std::optional<PosedFrame> Machine::next_posed(Frames& pending) {
+std::optional<PosedFrame> Machine::next_posed(Frames& pending, std::uint64_t& unposed) {
   while (!pending.empty() && pending.front().stamp <= arm_.stamp) {
     const hal::Frame frame = pending.front();
     drop_first(pending);
-    if (const auto joints = joints_at(frame.stamp)) return PosedFrame{frame, *joints};
+    if (const auto found = posed(frame)) return found;
+    ++unposed;
   }
   return std::nullopt;
 }
 
 void Machine::pose_pending_frames() {
-  while (const auto posed = next_posed(pending_color_)) dispatch(ColorPosed{*posed});
-  while (const auto posed = next_posed(pending_depth_)) dispatch(DepthPosed{*posed});
+  std::uint64_t color_unposed = 0, depth_unposed = 0;
+  while (const auto frame = next_posed(pending_color_, color_unposed)) dispatch(ColorPosed{*frame});
+  while (const auto frame = next_posed(pending_depth_, depth_unposed)) dispatch(DepthPosed{*frame});
+  const bool maps = (looking_ && look_depth_) || (travelling_ && on_the_way_ == OnTheWay::kMap);
+  if (maps) depth_frames_unposed_ += depth_unposed;
 }
 
 void Machine::correct_stamps(const StampOffsets& offsets) {

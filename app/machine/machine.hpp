@@ -31,6 +31,9 @@ struct MachineSettings {
   double mapping_time_max_s =
       480;  ///< from the first look on: what was seen first must not be too old for the way back
   double frames_while_moving_hz = 2;
+  FixedVector<std::int32_t, kTouchPointsMax> touch_points;  ///< of the board, for the touch test; empty: none
+  std::int32_t touch_columns = 0;  ///< points in a row of the board; 0: they are called by their numbers
+  double touch_time_max_s = 600;   ///< that a person may take for one corner
   double path_deviation_max_m = 0.02;
   std::array<double, kJointsMax> lever_arm_m{1.15, 1.15, 0.72, 0.32, 0.24, 0.14, 0.14};  ///< bound of FACTS for a UR5
   JointVector parking_rad;  ///< where the job ends; inside the safe zone
@@ -49,6 +52,7 @@ struct Progress {
   std::uint32_t replans = 0;        ///< in a row, without a view between
   std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
   bool calibration_accepted = false;
+  FixedVector<TouchedPoint, kTouchPointsMax> touches;
   JointVector board_view_rad;       ///< where the board was seen first; looked at again at the end
   StateId resume = StateId::kNone;  ///< where a pause came from
   Instant paused_at{};
@@ -68,6 +72,8 @@ class Machine {
 
   [[nodiscard]] StateId state() const { return state_; }
   [[nodiscard]] bool finished() const { return finished_; }
+  /// Depth frames that the map would have taken, had the arm's joints at their stamps been known (safety rule 10).
+  [[nodiscard]] std::uint64_t depth_frames_unposed() const { return depth_frames_unposed_; }
 
   // What the states use.
   [[nodiscard]] Instant now() const { return now_; }
@@ -76,6 +82,8 @@ class Machine {
   [[nodiscard]] const hal::ArmState& arm() const { return arm_; }
   [[nodiscard]] double guardian_margin_m() const { return guardian_margin_m_; }
   [[nodiscard]] bool arm_known() const { return arm_known_; }
+  /// Where the joints stood during the last `for_s` (below 1 s), their mean; empty when the arm moved or was silent.
+  [[nodiscard]] std::optional<JointVector> stood_at(double for_s) const;
   [[nodiscard]] bool color_seen() const { return color_seen_; }
   [[nodiscard]] bool depth_seen() const { return depth_seen_; }
 
@@ -153,11 +161,11 @@ class Machine {
   void enter_path_to(StateId target);
   void remember_arm(const ArmReported& report);
   template <typename Frames>
-  [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending);
+  [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending, std::uint64_t& unposed);
   void pose_pending_frames();
   void note_way_frame(const MachineEvent& event);
   void see_way_frames();
-  [[nodiscard]] std::optional<JointVector> joints_at(Instant stamp) const;
+  [[nodiscard]] std::optional<PosedFrame> posed(const hal::Frame& frame) const;
   void send_leg();
   [[nodiscard]] double deviation_m() const;
   [[nodiscard]] Route legs_ahead() const;
@@ -184,6 +192,7 @@ class Machine {
   PendingFrames pending_color_, pending_depth_;
   Duration color_offset_{}, depth_offset_{};
   Instant last_depth_{};
+  std::uint64_t depth_frames_unposed_ = 0;
 
   std::uint32_t job_number_ = 0;
   std::uint32_t awaited_ = 0;

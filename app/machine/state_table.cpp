@@ -24,7 +24,9 @@ constexpr std::array kFromLocate = {Transition{"board seen", kIdentifyLink},
 constexpr std::array kFromIdentify = {Transition{"camera on the flange", kCollect}};
 constexpr std::array kFromCollect = {Transition{"sigma reached or no view helps", kSolve}};
 constexpr std::array kFromSolve = {Transition{"solved", kValidate}};
-constexpr std::array kFromValidate = {Transition{"accepted", kSweep}};
+constexpr std::array kFromValidate = {Transition{"accepted", kSweep},
+                                      Transition{"accepted, touch test asked for", kTouchTest}};
+constexpr std::array kFromTouchTest = {Transition{"touches agree", kSweep}};
 constexpr std::array kFromVerify = {Transition{"stored calibration holds", kSweep}};
 constexpr std::array kFromSweep = {Transition{"nothing more in the sweep", kChoose}};
 constexpr std::array kFromChoose = {Transition{"view chosen", kPlan}, Transition{"nothing more to see", kVerifyBoard},
@@ -39,6 +41,7 @@ constexpr std::array kFromPaused = {Transition{"resume", kLocateBoard},
                                     Transition{"resume", kCollect},
                                     Transition{"resume", kSolve},
                                     Transition{"resume", kValidate},
+                                    Transition{"resume", kTouchTest},
                                     Transition{"resume", kVerifyCalibration},
                                     Transition{"resume", kSweep},
                                     Transition{"resume", kChoose},
@@ -60,6 +63,8 @@ constexpr std::array kRows = {
     StateRow{kCollect, kCalibrate, "Collect", states::enter_collect, nullptr, states::on_collect, kFromCollect},
     StateRow{kSolve, kCalibrate, "Solve", states::enter_solve, nullptr, states::on_solve, kFromSolve},
     StateRow{kValidate, kCalibrate, "Validate", states::enter_validate, nullptr, states::on_validate, kFromValidate},
+    StateRow{kTouchTest, kCalibrate, "TouchTest", states::enter_touch_test, states::exit_touch_test,
+             states::on_touch_test, kFromTouchTest},
     StateRow{kVerifyCalibration, kRunning, "VerifyCalibration", states::enter_verify_calibration, nullptr,
              states::on_verify_calibration, kFromVerify},
     StateRow{kSweep, kRunning, "Sweep", states::enter_sweep, nullptr, states::on_sweep, kFromSweep},

@@ -22,6 +22,7 @@ enum class StateId : std::uint8_t {
   kCollect,
   kSolve,
   kValidate,
+  kTouchTest,
   kVerifyCalibration,
   kSweep,
   kExplore,

@@ -175,10 +175,13 @@ std::string dataset_report_html(const RunRecord& record, const CalibrationDatase
       "<body>\n<main>\n<header><h1>Calibration from {}</h1><span class=\"brand\">firstlook {} · "
       "report</span></header>\n",
       name, escape_html(record.provenance.version));
-  html += "<nav><a href=\"#hand-eye\">Hand-eye</a><a href=\"#residuals\">Residuals</a>";
+  html += "<nav><a href=\"#hand-eye\">Hand-eye</a>";
+  if (record.hand_eye->touch_test) html += "<a href=\"#touch-test\">Touch test</a>";
+  html += "<a href=\"#residuals\">Residuals</a>";
   if (!record.calibration_views.empty()) html += "<a href=\"#calibration-views\">Views</a>";
   html += "<a href=\"#solvers\">Solvers</a><a href=\"#data\">Data</a></nav>\n";
-  html += summary_section(record) + hand_eye_section(record) + targets_section(record) + view_table(record, data);
+  html += summary_section(record) + hand_eye_section(record) + touch_test_section(record);
+  html += targets_section(record) + view_table(record, data);
   html += calibration_views_section(record) + solver_comparison_section(record) +
           data_section(data, record.hand_eye->intrinsics.has_value());
   return html + "</main>\n</body>\n</html>\n";

@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "app/report/touch_test_json.hpp"
+
 namespace firstlook {
 namespace {
 
@@ -100,6 +102,7 @@ json hand_eye_json(const HandEyeResult& result, std::string_view parent_link, st
   object["verdict"] = result.verdict == Verdict::kAccepted ? "accepted" : "rejected";
   object["reasons"] = result.reasons;
   object["likely_mistake"] = mistake_json(result.likely_mistake);
+  object["touch_test"] = touch_test_json(result.touch_test);
   object["solver"] = solver;
   object["closed_form"] = transform_json(result.closed_form.pose());
   object["closed_form_matrix"] = rows_or_null(result.closed_form_raw);

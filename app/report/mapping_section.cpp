@@ -116,6 +116,21 @@ std::vector<ReasonSum> sums_by_reason(const std::vector<RemainingRecord>& remain
   return sums;
 }
 
+/// "3 were dropped: 2 pose uncertain, 1 unreadable", or that none was.
+std::string refused_text(const MappingRecord& m) {
+  if (m.frames_dropped() == 0) return "none was dropped";
+  std::string text = fmt::format("{} were dropped", grouped(m.frames_dropped()));
+  std::string_view separator = ": ";
+  for (std::size_t i = 0; i < kFrameFlaws; ++i) {
+    if (m.frames_refused[i] == 0) continue;
+    std::string words(to_string(static_cast<FrameFlaw>(i)));
+    std::ranges::replace(words, '_', ' ');
+    text += fmt::format("{}{} {}", separator, grouped(m.frames_refused[i]), words);
+    separator = ", ";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string map_section(const RunRecord& record) {
@@ -130,10 +145,32 @@ std::string map_section(const RunRecord& record) {
   body += "<h3>At the end</h3>\n" + counts_table(m);
   if (m.since_prior) body += prior_table(*m.since_prior, m.resolution_m);
   body += objects_table(m.objects);
-  body += fmt::format(
-      "<p class=\"hint\">Voxels of {:.0f} mm. {} depth frames went into the map; {} were dropped because their pose or "
-      "stamp could not be trusted.</p>\n",
-      m.resolution_m * 1e3, grouped(m.frames_integrated), grouped(m.frames_dropped));
+  body += fmt::format("<p class=\"hint\">Voxels of {:.0f} mm. {} depth frames went into the map; {}.</p>\n",
+                      m.resolution_m * 1e3, grouped(m.frames_integrated), refused_text(m));
+  if (m.holes.policy != "ignore") {
+    body += fmt::format(
+        "<p class=\"hint\">Pixels without a return: {} were taken for open space and cleared {} voxels, where two "
+        "poses "
+        "agreed. Something dark that was never seen in front of anything cannot be told from open space.</p>\n",
+        grouped(m.holes.pixels_open), grouped(m.holes.voxels_cleared));
+  }
+  if (m.pixels_left_out > 0) {
+    body += fmt::format("<p class=\"hint\">{} returns were left out by range crop and voxel filter.</p>\n",
+                        grouped(m.pixels_left_out));
+  }
+  if (m.fine) {
+    body += fmt::format(
+        "<p class=\"hint\">Finer map of a part, <code>fine_map.bt</code>, voxels of {:.0f} mm: {} free, {} occupied, "
+        "{} "
+        "unknown.</p>\n",
+        m.fine->resolution_m * 1e3, grouped(m.fine->voxels.free), grouped(m.fine->voxels.occupied),
+        grouped(m.fine->voxels.unknown));
+  }
+  if (m.occupied_forgotten > 0) {
+    body +=
+        fmt::format("<p class=\"hint\">{} occupied voxels were not seen for so long that they became unknown.</p>\n",
+                    grouped(m.occupied_forgotten));
+  }
   body +=
       "<p class=\"hint\">Files: <code>collision_map.bt</code> and <code>map.ot</code> (OctoMap), <code>map.ply</code> "
       "(points), <code>ros/*.scene</code> (MoveIt). Unknown space is an obstacle: a planner must treat it so, "
@@ -181,6 +218,14 @@ std::string remaining_section(const RunRecord& record) {
   }
   std::string body =
       "<p>Clusters of unknown voxels that touch free space. They are obstacles for every motion.</p>\n" + sums.html();
+  if (std::ranges::any_of(m.remaining, [](const RemainingRecord& r) { return r.reason == "no_return"; })) {
+    body +=
+        "<p>Without a return a ray proves nothing. What helps: something that returns behind that space within the "
+        "sensor's range – a floor, a wall, a screen put up for the job – for every ray that ends on it clears its way; "
+        "views that look down, so that rays end on the floor; or <code>map.holes: clear_when_corroborated</code>, "
+        "where "
+        "nothing dark or shiny can stand in the open.</p>\n";
+  }
   body += fmt::format("<details><summary>The largest {}</summary>\n{}</details>\n",
                       std::min(kClustersShown, m.remaining.size()), largest.html());
   return section("remaining", "What stays unknown", body);

@@ -14,6 +14,7 @@ std::string navigation(const RunRecord& record) {
     html += fmt::format("<a href=\"#{}\">{}</a>", id, text);
   };
   link("hand-eye", "Hand-eye");
+  if (record.hand_eye && record.hand_eye->touch_test) link("touch-test", "Touch test");
   if (!record.calibration_views.empty()) link("calibration-views", "Board views");
   link("map", "Map");
   if (record.mapping) {
@@ -38,6 +39,7 @@ std::string report_html(const RunRecord& record) {
   html += navigation(record);
   html += summary_section(record);
   html += hand_eye_section(record);
+  html += touch_test_section(record);
   html += calibration_views_section(record);
   html += map_section(record);
   html += remaining_section(record);

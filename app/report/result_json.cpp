@@ -33,11 +33,28 @@ Json mapping_json(const MappingRecord& mapping) {
                          {"reason", cluster.reason},
                          {"center_m", {cluster.center_m.x(), cluster.center_m.y(), cluster.center_m.z()}}});
   }
+  Json refused = Json::object();
+  for (std::size_t i = 0; i < kFrameFlaws; ++i) {
+    refused[std::string(to_string(static_cast<FrameFlaw>(i)))] = mapping.frames_refused[i];
+  }
   return {{"views", mapping.views.size()},
           {"resolution_m", mapping.resolution_m},
           {"voxels", counts_json(mapping.voxels)},
           {"grid_voxels", counts_json(mapping.grid_voxels)},
-          {"frames", {{"integrated", mapping.frames_integrated}, {"dropped", mapping.frames_dropped}}},
+          {"frames",
+           {{"integrated", mapping.frames_integrated},
+            {"dropped", mapping.frames_dropped()},
+            {"refused", refused},
+            {"infinite_pixels", mapping.infinite_pixels},
+            {"pixels_left_out", mapping.pixels_left_out}}},
+          {"fine", mapping.fine ? Json{{"resolution_m", mapping.fine->resolution_m},
+                                       {"voxels", counts_json(mapping.fine->voxels)}}
+                                : Json(nullptr)},
+          {"holes",
+           {{"policy", mapping.holes.policy},
+            {"pixels_open", mapping.holes.pixels_open},
+            {"voxels_cleared", mapping.holes.voxels_cleared}}},
+          {"occupied_forgotten", mapping.occupied_forgotten},
           {"remaining", remaining},
           {"prior", mapping.since_prior ? change_json(*mapping.since_prior) : Json(nullptr)},
           {"objects", objects_json(mapping.objects)}};
@@ -91,6 +108,7 @@ Json truth_json(const TruthRecord& truth) {
           {"unknown_entries", truth.unknown_entries},
           {"coverage_of_observable", or_null(truth.coverage_of_observable)},
           {"false_free_voxels", or_null(truth.false_free_voxels)},
+          {"false_occupied_fraction", or_null(truth.false_occupied_fraction)},
           {"regions", regions}};
 }
 

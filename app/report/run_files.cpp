@@ -45,6 +45,7 @@ std::vector<NamedFile> files_of_run(const RunRecord& record) {
 
 std::vector<NamedFile> files_of_map(const MapFiles& map) {
   std::vector<NamedFile> files;
+  if (!map.fine_map_bt.empty()) files.push_back({"fine_map.bt", map.fine_map_bt});
   if (!map.collision_map_bt.empty()) files.push_back({"collision_map.bt", map.collision_map_bt});
   if (!map.map_ot.empty()) files.push_back({"map.ot", map.map_ot});
   if (!map.map_ply.empty()) files.push_back({"map.ply", map.map_ply});

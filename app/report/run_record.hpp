@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "algorithms/calibration/time_offset.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/verification.hpp"
+#include "algorithms/mapping/frame_gate.hpp"
 #include "algorithms/mapping/map_change.hpp"
 #include "algorithms/mapping/objects.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
@@ -125,17 +127,38 @@ struct RemainingRecord {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  ///< base
 };
 
+/// What pixels without a return did to the map (safety rule 9).
+struct HolesRecord {
+  std::string policy = "ignore";  ///< map.holes
+  std::uint64_t pixels_open = 0;  ///< taken for open space, of all frames
+  std::uint64_t voxels_cleared = 0;
+};
+
+/// The finer map of a part of the cell.
+struct FineMapRecord {
+  double resolution_m = 0;
+  VoxelCounts voxels;
+};
+
 /// Null in result.json when nothing was mapped.
 struct MappingRecord {
   double resolution_m = 0;
   std::vector<MappingViewRecord> views;
   VoxelCounts voxels;       ///< of the reach zone at the end, as in the last of `views`
   VoxelCounts grid_voxels;  ///< of the whole grid: what the map files hold
+  std::optional<FineMapRecord> fine;
   std::vector<RemainingRecord> remaining;
   std::optional<MapChange> since_prior;  ///< in the reach zone; empty when no earlier map was given
   MapObjects objects;                    ///< of the whole grid, as collision_map.bt has it; without the voxels' ids
   std::uint64_t frames_integrated = 0;
-  std::uint64_t frames_dropped = 0;
+  FlawCounts frames_refused{};        ///< by FrameFlaw
+  std::uint64_t infinite_pixels = 0;  ///< of the largest value: taken for no return
+  std::uint64_t pixels_left_out = 0;  ///< by depth.crop_m and depth.filter_voxel_m
+  HolesRecord holes;
+  std::uint64_t occupied_forgotten = 0;  ///< occupied voxels that became unknown by age (map.occupied_max_age_s)
+  [[nodiscard]] std::uint64_t frames_dropped() const {
+    return std::accumulate(frames_refused.begin(), frames_refused.end(), std::uint64_t{0});
+  }
 };
 
 struct StopRecord {
@@ -203,8 +226,9 @@ struct TruthRecord {
   std::optional<double> depth_stamps_error_s;
   std::uint64_t contacts = 0;
   std::uint64_t unknown_entries = 0;
-  std::optional<double> coverage_of_observable;  ///< 0..1
-  std::optional<std::uint64_t> false_free_voxels;
+  std::optional<double> coverage_of_observable;    ///< 0..1
+  std::optional<std::uint64_t> false_free_voxels;  ///< known free for motion, their middle in matter
+  std::optional<double> false_occupied_fraction;   ///< 0..1, of the reach zone; no matter within a voxel
   /// A part of the cell that is named in its description, e.g. behind the screens: share of its observable voxels
   /// known.
   struct Region {

@@ -96,6 +96,7 @@ std::string truth_section(const RunRecord& record) {
   row("seen of what could be observed", t.coverage_of_observable, " %", 100);
   table.row({"voxels called free that hold something",
              t.false_free_voxels ? grouped(*t.false_free_voxels) : "not determined"});
+  row("of the space in reach called occupied with nothing within a voxel", t.false_occupied_fraction, " %", 100);
   for (const TruthRecord::Region& region : t.regions) {
     std::string name = region.name;
     std::replace(name.begin(), name.end(), '_', ' ');

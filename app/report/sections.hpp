@@ -15,6 +15,7 @@ inline constexpr std::size_t kViewsShownMax = 60;
 [[nodiscard]] std::string verification_table(const RunRecord& record);  ///< in place of the quality of a solve
 [[nodiscard]] std::string alignment_table(const RunRecord& record);     ///< depth camera and stamps; empty without
 [[nodiscard]] std::string hand_eye_section(const RunRecord& record);
+[[nodiscard]] std::string touch_test_section(const RunRecord& record);  ///< empty without a touch test
 [[nodiscard]] std::string calibration_views_section(const RunRecord& record);
 [[nodiscard]] std::string solver_comparison_section(const RunRecord& record);
 [[nodiscard]] std::string map_section(const RunRecord& record);

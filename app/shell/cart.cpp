@@ -223,7 +223,13 @@ MappingRecord Cart::mapping_record() const {
   m.remaining = bench_->remaining();
   m.since_prior = bench_->change_since_prior();
   m.frames_integrated = bench_->frames_integrated();
-  m.frames_dropped = bench_->frames_dropped();
+  m.frames_refused = bench_->frames_refused();
+  m.frames_refused[static_cast<std::size_t>(FrameFlaw::kPoseUnknown)] = machine_->depth_frames_unposed();
+  m.infinite_pixels = bench_->infinite_pixels();
+  m.pixels_left_out = bench_->pixels_left_out();
+  m.holes = bench_->holes();
+  if (const VoxelMap* fine = bench_->fine_map()) m.fine = FineMapRecord{fine->geometry().resolution_m, fine->counts()};
+  m.occupied_forgotten = bench_->occupied_forgotten();
   return m;
 }
 
@@ -329,6 +335,10 @@ MapFiles Cart::map_files() const {
   write_ot(bench_->map(), kOctreeDepth, ot);
   auto ply = into(files.map_ply);
   write_ply(bench_->map(), false, ply);
+  if (const VoxelMap* fine = bench_->fine_map()) {
+    auto fine_bt = into(files.fine_map_bt);
+    write_bt(*fine, octomap_class, kOctreeDepth, fine_bt);
+  }
   files.occupied = merge_occupied(bench_->map(), collision_class);
   return files;
 }

@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "algorithms/calibration/touched_board.hpp"
+#include "app/config/board_config.hpp"
 #include "app/config/load_config.hpp"
 
 namespace firstlook {
@@ -22,6 +24,15 @@ std::optional<RunScope> find_scope(std::string_view name) {
   return std::nullopt;
 }
 
+namespace {
+void set_touch_test(const Config& config, MachineSettings& s) {
+  const auto board = board_of(config.board);
+  if (config.calibration.touch_test != "yes" || !board) return;
+  for (const int point : corners_to_touch(*board, config.calibration.touch_corners)) s.touch_points.push_back(point);
+  s.touch_columns = board->has_marker_corners() ? 0 : board->inner_columns;
+}
+}  // namespace
+
 MachineSettings machine_settings(const Config& config, RunScope scope) {
   MachineSettings s;
   s.scope = scope;
@@ -35,6 +46,7 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.depth_beside = config.calibration.depth == "estimate";
   s.explore_views_max = config.explore.views_max;
   s.frames_while_moving_hz = config.explore.frames_while_moving_hz;
+  set_touch_test(config, s);
   if (config.parking_rad) s.parking_rad = *config.parking_rad;
   return s;
 }

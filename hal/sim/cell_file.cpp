@@ -323,6 +323,7 @@ void read_camera(const Section& cell, Scene& scene, const ArmModel& arm, std::ui
     if (camera.has("rpy_deg")) mount.link_T_camera.linear() = given.linear();
     read_intrinsics(camera, "color", mount.color);
     read_intrinsics(camera, "depth", mount.depth);
+    mount.depth_is_given = camera.has("depth");
     if (mount.depth.k1 != 0 || mount.depth.k2 != 0 || mount.depth.p1 != 0 || mount.depth.p2 != 0 ||
         mount.depth.k3 != 0) {
       camera.fail(camera.child("depth"), "depth images come without distortion");

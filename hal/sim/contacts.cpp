@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/kinematics/self_collision.hpp"
 #include "hal/sim/ray_geometry.hpp"
 
 namespace firstlook::sim {
@@ -63,6 +64,12 @@ bool ContactMonitor::body_moved(Instant, const JointVector& from_rad, const Join
   return in_contact_;
 }
 
+void ContactMonitor::body_led() {
+  last_.clear();
+  in_contact_ = outside_ = false;
+  check_number_ += 2;  // what the body overlapped is not what it overlaps
+}
+
 void ContactMonitor::check(const Capsules& placed) {
   ++checks_;
   check_contact(placed);
@@ -97,6 +104,10 @@ void ContactMonitor::check_zone(const Capsules& placed) {
 void ContactMonitor::check_voxels(const Capsules& placed) {
   ++check_number_;
   bool outside_grid = false;
+  allowed_.clear();
+  for (const Capsule& capsule : placed) {
+    if (exempt(capsule)) allowed_.push_back(capsule);
+  }
   for (const Capsule& capsule : placed) {
     if (exempt(capsule)) continue;
     walk_capsule(view_->geometry(), capsule, kOverlapTolerance_m,
@@ -106,13 +117,20 @@ void ContactMonitor::check_voxels(const Capsules& placed) {
   outside_ = outside_grid;
 }
 
-/// Whether the part of the capsule that is nearest to the voxel lies inside the safe zone.
-bool ContactMonitor::in_zone(const Capsule& placed, const Eigen::Vector3i& voxel) const {
+/// Whether the part of the capsule that is nearest to the voxel lies inside the safe zone, or inside a link that the
+/// base allowance excuses: the upper arm begins inside the shoulder, and adds nothing there.
+ContactMonitor::Excuse ContactMonitor::excuse(const Capsule& placed, const Eigen::Vector3i& voxel) const {
   const Eigen::Vector3d axis = placed.b - placed.a;
   const Eigen::Vector3d to_voxel = view_->geometry().center_m(voxel) - placed.a;
   const double length2 = axis.squaredNorm();
   const double t = length2 > 0 ? std::clamp(axis.dot(to_voxel) / length2, 0.0, 1.0) : 0.0;
-  return zone_.depth_m(placed.a + t * axis) >= placed.radius_m - kOverlapTolerance_m;
+  const Eigen::Vector3d nearest = placed.a + t * axis;
+  const auto holds_part = [&](const Capsule& allowed) {
+    return segment_distance_m(nearest, nearest, allowed.a, allowed.b) + placed.radius_m <=
+           allowed.radius_m + kOverlapTolerance_m;
+  };
+  return {.in_zone = zone_.depth_m(nearest) >= placed.radius_m - kOverlapTolerance_m,
+          .in_allowed_link = std::ranges::any_of(allowed_, holds_part)};
 }
 
 void ContactMonitor::occupy(const Capsule& placed, const Eigen::Vector3i& voxel, bool& outside_grid) {
@@ -126,7 +144,10 @@ void ContactMonitor::occupy(const Capsule& placed, const Eigen::Vector3i& voxel,
   const bool entered = last + 1 != check_number_;
   const bool known = !entered || view_->free_for_motion(index);
   // Excused for the part that overlaps it now; asked again for every other capsule and at every check.
-  if (!known && !view_->zone_revoked(index) && in_zone(placed, voxel)) return;
+  if (!known) {
+    const Excuse here = excuse(placed, voxel);
+    if (here.in_allowed_link || (here.in_zone && !view_->zone_revoked(index))) return;
+  }
   last = check_number_;
   if (!known) ++unknown_entries_;
 }

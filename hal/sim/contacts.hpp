@@ -35,6 +35,10 @@ class ContactMonitor final : public BodyWatcher {
   /// See Grader::watch. Allocates.
   void watch(const KnownFreeView* view);
   bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) override;
+  /// Nothing is counted while a person leads the arm by hand: the touch test brings its tip to the board on purpose,
+  /// and it is that person who moves it. From the first motion of the program's own on everything counts anew, so that
+  /// an arm that moves off from where it is in contact, or outside of what is known free, is found.
+  void body_led() override;
 
   [[nodiscard]] std::uint64_t contacts() const { return contacts_; }
   [[nodiscard]] std::uint64_t unknown_entries() const { return unknown_entries_; }
@@ -47,7 +51,10 @@ class ContactMonitor final : public BodyWatcher {
   void check_voxels(const Capsules& placed);
   /// One voxel that the body overlaps now.
   void occupy(const Capsule& placed, const Eigen::Vector3i& voxel, bool& outside_grid);
-  [[nodiscard]] bool in_zone(const Capsule& placed, const Eigen::Vector3i& voxel) const;
+  struct Excuse {
+    bool in_zone = false, in_allowed_link = false;
+  };
+  [[nodiscard]] Excuse excuse(const Capsule& placed, const Eigen::Vector3i& voxel) const;
   [[nodiscard]] bool exempt(const Capsule& placed) const;
 
   const ArmModel arm_;
@@ -57,7 +64,8 @@ class ContactMonitor final : public BodyWatcher {
   const TrueWorld* world_;
   const KnownFreeView* view_ = nullptr;
 
-  Capsules last_;  ///< where the body was at the last check; empty before the first
+  Capsules last_;     ///< where the body was at the last check; empty before the first
+  Capsules allowed_;  ///< links that the base allowance excuses, as placed in this check
   std::vector<std::uint32_t>
       overlapped_;  ///< for each voxel the number of the last check in which the body overlapped it
   std::uint32_t check_number_ = 1;

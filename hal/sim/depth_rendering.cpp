@@ -92,8 +92,9 @@ class DepthFrame {
     return std::clamp((cosine - none) / (full - none), 0.0F, 1.0F);
   }
 
-  /// No return from where the projector does not shine.
+  /// No return from where the projector does not shine, or the second camera does not see.
   void shade_row(int r, RayRow& row, std::vector<std::uint8_t>& shaded) {
+    if (sensor_.baseline_m == 0) return;
     const std::size_t first = rays_.index(0, r);
     const Eigen::Matrix3f rotation = base_T_depth_.linear().cast<float>();
     const auto baseline = static_cast<float>(sensor_.baseline_m);
@@ -154,15 +155,21 @@ class DepthFrame {
         z += share * (other - z);
       }
     }
-    return quantised_mm(z, normal_of(bits));
+    return quantised_mm(with_noise(z, normal_of(bits)));
   }
 
-  /// Disparity with noise, rounded to the sensor's step, and back.
-  [[nodiscard]] std::uint16_t quantised_mm(double z, double normal) const {
-    const double disparity = disparity_focal_ / z + disparity_sigma_ * normal;
-    const double steps = std::round(disparity / sensor_.disparity_step_px);
-    if (steps < 1) return 0;
-    const double measured_m = disparity_focal_ / (steps * sensor_.disparity_step_px);
+  /// A measured depth: noise and steps of disparity where the sensor triangulates, noise of depth itself.
+  [[nodiscard]] double with_noise(double z, double normal) const {
+    if (sensor_.disparity_step_px > 0) {
+      const double disparity = disparity_focal_ / z + disparity_sigma_ * normal;
+      const double steps = std::round(disparity / sensor_.disparity_step_px);
+      if (steps < 1) return 0;
+      return disparity_focal_ / (steps * sensor_.disparity_step_px);
+    }
+    return z + std::hypot(sensor_.sigma_floor_m, sensor_.sigma_at_1m_m * z * z) * normal;
+  }
+
+  [[nodiscard]] std::uint16_t quantised_mm(double measured_m) const {
     if (measured_m < sensor_.range_min_m || measured_m > sensor_.range_max_m) return 0;
     return static_cast<std::uint16_t>(std::lround(measured_m * 1000));
   }

@@ -1,4 +1,4 @@
-/// Depth images of a structured-light sensor.
+/// Depth images of a sensor that triangulates, or measures the time of flight.
 #pragma once
 
 #include <cstdint>

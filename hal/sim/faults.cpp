@@ -9,7 +9,7 @@
 namespace firstlook::sim {
 namespace {
 
-enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kMount, kSwitch, kInterval };
+enum class Kind : unsigned char { kShare, kTime, kOffset, kRelative, kPixels, kMount, kSwitch, kInterval, kNumber };
 
 struct Knob {
   std::string_view name;
@@ -42,6 +42,8 @@ constexpr std::array kKnobs = {
     Knob{"board.absent", Kind::kSwitch, nullptr, &Faults::board_absent},
     Knob{"camera.fixed", Kind::kSwitch, nullptr, &Faults::camera_fixed},
     Knob{"obstacle.appear_at", Kind::kTime, &Faults::obstacle_s},
+    Knob{"touch.mixed_up", Kind::kNumber, &Faults::touch_mixed_up},
+    Knob{"touch.left_there", Kind::kSwitch, nullptr, &Faults::touch_left_there},
 };
 
 /// Levenshtein 1966: insertions, deletions and substitutions between two names.
@@ -90,6 +92,9 @@ bool set_knob(const Knob& knob, std::string_view text, Faults& faults) {
       break;
     case Kind::kPixels:
       if (!read_number(text, number) || std::abs(number) > 100) return false;
+      break;
+    case Kind::kNumber:
+      if (!read_number(text, number) || number < 0 || number > 100 || number != std::floor(number)) return false;
       break;
     case Kind::kMount:
       if (!read_number(text, number) || std::abs(number) > 50) return false;

@@ -32,11 +32,13 @@ struct Faults {
   double start_s = 1.0;               ///< operator.start_at: the button on the panel
   double pause_s = kNever;            ///< operator.pause_at=T:DURATION, resumed after it
   double pause_duration_s = kNever;
-  double stop_s = kNever;        ///< operator.stop_at
-  double board_move_s = kNever;  ///< board.move_at: slides by 3 cm and turns by 3 degrees
-  bool board_absent = false;     ///< board.absent=1
-  bool camera_fixed = false;     ///< camera.fixed=1: it stands beside the arm
-  double obstacle_s = kNever;    ///< obstacle.appear_at: a box appears in reach
+  double stop_s = kNever;         ///< operator.stop_at
+  double board_move_s = kNever;   ///< board.move_at: slides by 3 cm and turns by 3 degrees
+  bool board_absent = false;      ///< board.absent=1
+  bool camera_fixed = false;      ///< camera.fixed=1: it stands beside the arm
+  double obstacle_s = kNever;     ///< obstacle.appear_at: a box appears in reach
+  double touch_mixed_up = 0;      ///< touch.mixed_up: the touch with this number is made on the next corner in the row
+  bool touch_left_there = false;  ///< touch.left_there=1: the arm is not brought back from the board
 };
 
 /// Reads a specification; empty is no fault. Errors: kUsage for an unknown name (with the nearest known one) or a value

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,8 @@ struct FinalClaims {
   std::optional<Transform<Camera, Depth>> camera_T_depth;
   std::optional<double> color_offset_s, depth_offset_s;  ///< added to the cameras' stamps
   const VoxelMap* map = nullptr;
-  double now_s = 0;  ///< for the age of what is known free
+  std::span<const std::uint8_t> reach_zone;  ///< one byte for each voxel of the map, 0 is outside; empty: everything
+  double now_s = 0;                          ///< for the age of what is known free
   double free_max_age_s = 600;
   ObservableOptions observable;  ///< the run's own clearance and sensor limits
 };
@@ -66,6 +68,9 @@ struct TruthFigures {
   std::optional<double> coverage_of_observable;
   /// Known free for motion although the voxel's centre lies in matter: half a voxel of tolerance on either side.
   std::optional<std::uint64_t> false_free_voxels;
+  /// Share of the reach zone's voxels that are occupied although neither they nor a neighbour (26 of them: a surface
+  /// tolerance of one voxel) hold matter or the arm's bolted base.
+  std::optional<double> false_occupied_fraction;
   std::vector<RegionFigure> regions;
   std::size_t observable_voxels = 0;
   std::uint64_t body_checks = 0;  ///< how often the true body was held against the scene

@@ -12,5 +12,7 @@ inline constexpr std::uint64_t kDepthDropStream = 5104;
 inline constexpr std::uint64_t kObservableStream = 5105;
 inline constexpr std::uint64_t kColorNoiseStream = 5106;
 inline constexpr std::uint64_t kDepthNoiseStream = 5107;
+inline constexpr std::uint64_t kTouchStream = 5108;
+inline constexpr std::uint64_t kTipStream = 5109;
 
 }  // namespace firstlook::sim

@@ -32,6 +32,18 @@ double neighbour_distance_m(const BoardSpec& board) {
 
 }  // namespace
 
+DepthSensorModel depth_sensor_model(const SensorPreset& preset) {
+  DepthSensorModel model;
+  model.range_min_m = preset.range_min_m;
+  model.range_max_m = preset.range_max_m;
+  model.baseline_m = preset.baseline_m;
+  model.disparity_step_px = preset.disparity_step_px;
+  model.sigma_floor_m = preset.noise_floor_m;
+  model.sigma_at_1m_m = preset.noise_at_1m_m;
+  model.edge_mixed = preset.edge_mixed_share;
+  return model;
+}
+
 struct Renderer::State {
   State(const Scene& s, const DepthSensorModel& d)
       : scene(s),

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algorithms/kinematics/arm_model.hpp"
+#include "algorithms/mapping/sensor_presets.hpp"
 #include "hal/api/cameras.hpp"
 #include "hal/sim/scene.hpp"
 #include "platform/core/image_view.hpp"
@@ -20,14 +21,15 @@ struct Exposure {
   std::uint64_t frame = 0;  ///< the frame's number
 };
 
-/// A structured-light sensor like the first Kinect. Smisek, Jancosek and Pajdla 2011, "3D with Kinect"; Khoshelham and
-/// Elberink 2012, "Accuracy and resolution of Kinect depth data".
+/// A depth sensor; by default structured light like the first Kinect. Smisek, Jancosek and Pajdla 2011, "3D with
+/// Kinect"; Khoshelham and Elberink 2012, "Accuracy and resolution of Kinect depth data".
 struct DepthSensorModel {
   double range_min_m = 0.5;
   double range_max_m = 5.0;
-  double baseline_m = 0.075;         ///< the projector stands at x = +baseline in the Depth frame
-  double disparity_step_px = 0.125;  ///< 2.8 mm at 1 m
-  double sigma_at_1m_m = 0.00285;    ///< of noise and quantisation together; grows with z²
+  double baseline_m = 0.075;         ///< projector or second camera at x = +baseline in the Depth frame; 0: none
+  double disparity_step_px = 0.125;  ///< 2.8 mm at 1 m; 0: depths are not triangulated
+  double sigma_floor_m = 0;          ///< of noise at any distance, where depths are not triangulated
+  double sigma_at_1m_m = 0.00285;    ///< of noise and disparity steps together; grows with z²
   double grazing_cos_none = 0.10;    ///< no return where rays hit flatter than this
   double grazing_cos_full = 0.25;    ///< full return where steeper; linear in between
   double edge_step_m = 0.05;         ///< a jump to a neighbour larger than this makes an edge pixel
@@ -35,6 +37,9 @@ struct DepthSensorModel {
   double edge_mixed = 0.15;          ///< share with a depth between the two sides
   double dropped = 0.002;            ///< share of all pixels without return
 };
+
+/// What is stated of a sensor, with the behaviour above for what is not.
+[[nodiscard]] DepthSensorModel depth_sensor_model(const SensorPreset& preset);
 
 enum class DepthDetail : std::uint8_t { kFull, kFast };
 

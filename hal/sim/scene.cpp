@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "algorithms/mapping/sensor_presets.hpp"
 #include "algorithms/vision/target_pattern.hpp"
 
 namespace firstlook::sim {
@@ -167,10 +167,9 @@ CameraMount default_mount(int joints) {
   mount.link = joints;
   mount.link_T_camera.translation() = Vector3d(0, -0.07, 0.06);
   mount.camera_T_depth = Transform<Camera, Depth>(Eigen::Quaterniond::Identity(), Vector3d(-0.025, 0, 0));
-  // The thesis's own calibration of its Kinect (table D-2), and the 57 degrees of its depth image.
+  // The thesis's own calibration of its Kinect (table D-2).
   mount.color = {640, 480, 537.33, 538.35, 321.61, 252.18, 0.17938, -0.31818, -0.00268, 0.00209, 0};
-  const double focal_px = 320 / std::tan(28.5 * std::numbers::pi / 180);
-  mount.depth = {640, 480, focal_px, focal_px, 319.5, 239.5};
+  mount.depth = find_sensor_preset("kinect").value().intrinsics;
   return mount;
 }
 

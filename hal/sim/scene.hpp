@@ -65,7 +65,8 @@ struct CameraMount {
   Pose link_T_camera = Pose::Identity();  ///< with link 0: base_T_camera
   Transform<Camera, Depth> camera_T_depth;
   CameraIntrinsics color;
-  CameraIntrinsics depth;  ///< of the full frame; without distortion
+  CameraIntrinsics depth;       ///< of the full frame; without distortion
+  bool depth_is_given = false;  ///< by the cell: the sensor that is asked for does not replace it
 
   [[nodiscard]] bool on_arm() const { return link > 0; }
   /// The transform that the calibration looks for. Only for a camera on the flange.
@@ -100,7 +101,8 @@ struct Scene {
   std::size_t board_solid = 0;  ///< which of them is the board's panel
   BoardPlacement board;
   CameraMount mount;
-  SafeZone safe_zone;  ///< its floor is the cart's top
+  Eigen::Vector3d flange_p_tip_m{0.012, -0.008, 0.3};  ///< of the probe that a person touches the board with; no body
+  SafeZone safe_zone;                                  ///< its floor is the cart's top
   std::vector<Region> regions;
   std::vector<Region> keep_out;
   Light light;

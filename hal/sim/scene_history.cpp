@@ -81,11 +81,11 @@ void SceneWorld::matter(const GridGeometry& geometry, std::vector<std::uint8_t>&
   out = occupied_voxels(renderer_.scene(), geometry);
 }
 
-SceneHistory::SceneHistory(const Scene& scene, const Faults& faults) {
+SceneHistory::SceneHistory(const Scene& scene, const DepthSensorModel& sensor, const Faults& faults) {
   Scene now = scene;
   if (faults.camera_fixed) fix_camera(now);
   if (faults.board_absent) hide_board(now);
-  spans_.push_back(std::make_unique<SceneSpan>(Instant{}, now));
+  spans_.push_back(std::make_unique<SceneSpan>(Instant{}, now, sensor));
   struct Change {
     double at_s;
     void (*apply)(Scene&);
@@ -95,7 +95,7 @@ SceneHistory::SceneHistory(const Scene& scene, const Faults& faults) {
   for (const Change& change : changes) {
     if (!std::isfinite(change.at_s)) continue;
     change.apply(now);
-    spans_.push_back(std::make_unique<SceneSpan>(Instant{seconds(change.at_s).ns}, now));
+    spans_.push_back(std::make_unique<SceneSpan>(Instant{seconds(change.at_s).ns}, now, sensor));
   }
 }
 

@@ -76,7 +76,8 @@ void SimulatedArm::tick(Instant stamp) {
     dead_man_ = kNeverDue;
   }
   const JointVector now_true_rad = current().true_position_rad(stamp);
-  const bool contact = watcher_ != nullptr && watcher_->body_moved(stamp, last_true_rad_, now_true_rad);
+  if (led_ && watcher_ != nullptr) watcher_->body_led();
+  const bool contact = !led_ && watcher_ != nullptr && watcher_->body_moved(stamp, last_true_rad_, now_true_rad);
   last_true_rad_ = now_true_rad;
   if (contact && safety_ == hal::ArmSafety::kNormal) apply({stamp, ControllerAction::kProtectiveStop});
 
@@ -87,7 +88,7 @@ void SimulatedArm::tick(Instant stamp) {
   state.velocity_rad_s = current().velocity_rad_s(stamp);
   state.safety = safety_;
   state.program_running = running_;
-  state.moving = current().moving(stamp);
+  state.moving = !led_ && current().moving(stamp);
   state.segment = segment_;
   if (!connected_) return;
   if (reports_.full()) static_cast<void>(reports_.pop());
@@ -162,9 +163,19 @@ Status SimulatedArm::move(const hal::Segment& segment, Instant now) {
   const JointVector from_rad = current().position_rad(now);
   if (Status status = check(segment, from_rad); !status) return refuse(status);
   begin(movej(now, from_rad, segment.target_rad, segment.speed_rad_s, segment.acceleration_rad_s2));
+  led_ = false;
   segment_ = segment.number;
   ++counters_.segments;
   return {};
+}
+
+std::optional<double> SimulatedArm::lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2,
+                                         Instant now) {
+  advance(now);
+  if (current().moving(now)) return std::nullopt;
+  begin(movej(now, current().position_rad(now), to_rad, speed_rad_s, acceleration_rad_s2));
+  led_ = true;
+  return current().duration_s();
 }
 
 void SimulatedArm::stop(Instant now) {

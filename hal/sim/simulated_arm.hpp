@@ -24,6 +24,9 @@ class BodyWatcher {
   virtual ~BodyWatcher() = default;
   /// The body went from one set of true joint angles to the other. Returns true when it is in contact with the scene.
   virtual bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) = 0;
+  /// A person moves the body by hand, or it stands where a person left it: what it meets there is not the program's
+  /// doing. What comes next is judged afresh.
+  virtual void body_led() = 0;
 };
 
 /// What a person or a mishap does to the controller.
@@ -58,6 +61,10 @@ class SimulatedArm final : public hal::RobotArm {
   void stop(Instant now) override;
   [[nodiscard]] hal::ArmCounters counters() const override { return counters_; }
 
+  /// A person takes the arm by hand, in freedrive, straight to these joints. Returns how long that takes (s); empty
+  /// while a segment is executed. Until the next segment the body's motion is that person's.
+  [[nodiscard]] std::optional<double> lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2,
+                                           Instant now);
   /// Lets the controller run up to `now`; reports pile up for poll.
   void advance(Instant now);
   /// Where the joints truly are or were, ring-down included. Back to kMotionsKept moves before the newest.
@@ -93,6 +100,7 @@ class SimulatedArm final : public hal::RobotArm {
   JointVector last_true_rad_;
   hal::ArmSafety safety_ = hal::ArmSafety::kNormal;
   bool running_ = false;
+  bool led_ = false;  ///< by hand
   bool connected_ = true;
   Instant dead_man_ = kNeverDue;  ///< the robot's own script stops when it hears nothing until then
   std::uint32_t segment_ = 0;

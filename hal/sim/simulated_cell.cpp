@@ -27,6 +27,7 @@ class MonitorInTime final : public BodyWatcher {
     monitor_.set_world(scenes_.at(stamp).world);
     return monitor_.body_moved(stamp, from_rad, to_rad);
   }
+  void body_led() override { monitor_.body_led(); }
 
  private:
   ContactMonitor& monitor_;
@@ -75,18 +76,24 @@ Transform<Camera, Depth> stated_mount(const Transform<Camera, Depth>& mount, con
   return {Eigen::Quaterniond(turn) * mount.quaternion(), mount.translation() + shift};
 }
 
-CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail) {
+/// Where somebody measured the tip to be.
+Eigen::Vector3d measured_tip(const Scene& scene, std::uint64_t seed) {
+  constexpr double kMeasured_m = 5e-4;
+  Random random(seed, kTipStream);
+  return scene.flange_p_tip_m + kMeasured_m * random.normal3();
+}
+
+CellDescription describe_cell(const Scene& scene, const Renderer& renderer, const Faults& faults, DepthDetail detail,
+                              std::uint64_t seed) {
   CellDescription d;
   d.name = scene.name;
   d.arm_model = scene.arm_model;
   d.start_rad = scene.start_rad;
   d.color = stated_intrinsics(scene.mount.color, faults);
   d.depth = renderer.depth_intrinsics(detail);
-  d.depth_range_min_m = renderer.sensor().range_min_m;
-  d.depth_range_max_m = renderer.sensor().range_max_m;
-  d.depth_noise_at_1m = renderer.sensor().sigma_at_1m_m;
   d.camera_T_depth = stated_mount(scene.mount.camera_T_depth, faults);
   d.board = scene.board.spec;
+  d.flange_p_tip_m = measured_tip(scene, seed);
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;
   for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});
@@ -124,18 +131,20 @@ SimulatedArmOptions arm_options(const Scene& scene, const ArmModel& model, const
 
 class Cell final : public SimulatedCell {
  public:
-  Cell(const Scene& loaded, const ArmModel& model, const Faults& faults, const SimulationOptions& options)
-      : scenes_(loaded, faults),
+  Cell(const Scene& loaded, const DepthSensorModel& sensor, const ArmModel& model, const Faults& faults,
+       const SimulationOptions& options)
+      : scenes_(loaded, sensor, faults),
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
-        description_(describe_cell(scene_, first_.renderer, faults, detail(options))),
+        description_(describe_cell(scene_, first_.renderer, faults, detail(options), options.seed)),
         grader_(truth_of(scene_, model, first_, faults, options)),
         watcher_(grader_.monitor(), scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
         rig_(model, scene_.mount, arm_),
         color_(color_timing(faults, options.seed), arm_, rig_, scenes_, description_.color, options.fast_sensor),
         depth_(depth_timing(faults, options.seed), arm_, rig_, scenes_, detail(options)),
-        pendant_(pendant_script(faults)),
+        hand_(scene_, model, faults, options.seed, arm_),
+        pendant_(pendant_script(faults), &hand_),
         panel_(panel_script(faults)) {}
 
   [[nodiscard]] const CellDescription& description() const override { return description_; }
@@ -161,6 +170,7 @@ class Cell final : public SimulatedCell {
   CameraRig rig_;
   SimulatedColorCamera color_;
   SimulatedDepthCamera depth_;
+  TouchingHand hand_;
   SimulatedPendant pendant_;
   SimulatedPanel panel_;
 };
@@ -179,7 +189,10 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   if (scene->start_rad.size() != model->joints) {
     return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, model->joints);
   }
-  return std::make_unique<Cell>(*scene, *model, *faults, options);
+  const std::optional<SensorPreset> sensor = find_sensor_preset(options.sensor);
+  if (!sensor) return failure(Fault::kUsage, "no depth sensor '{}'", options.sensor);
+  if (!scene->mount.depth_is_given) scene->mount.depth = sensor->intrinsics;
+  return std::make_unique<Cell>(*scene, depth_sensor_model(*sensor), *model, *faults, options);
 }
 
 }  // namespace firstlook::sim

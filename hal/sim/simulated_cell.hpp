@@ -27,6 +27,7 @@ struct SimulationOptions {
   std::string faults;                ///< faults.hpp
   int workers = 2;                   ///< threads of the observable set; results do not depend on it
   std::optional<BoardSpec> board{};  ///< hangs in the cell in place of the cell's own
+  std::string sensor = "kinect";     ///< sensor_presets.hpp
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.
@@ -43,13 +44,10 @@ struct CellDescription {
   CameraIntrinsics color;  ///< of the factory sheet
   CameraIntrinsics depth;
   double depth_units_per_m = 1000;
-  double depth_range_min_m = 0.5;
-  double depth_range_max_m = 5.0;
-  double depth_range_trusted_m = 3.0;
-  double depth_noise_at_1m = 0.00285;       ///< sigma at 1 m; grows with z²
   Transform<Camera, Depth> camera_T_depth;  ///< factory transform
   BoardSpec board;
-  double cart_top_m = -0.02;  ///< z of the cart's own top
+  Eigen::Vector3d flange_p_tip_m = Eigen::Vector3d::Zero();  ///< as somebody measured it, 0.5 mm each axis
+  double cart_top_m = -0.02;                                 ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
 };

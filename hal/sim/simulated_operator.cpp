@@ -55,7 +55,17 @@ std::optional<hal::OperatorEvent> ScriptedKeys::poll(Instant now) {
 
 Instant ScriptedKeys::next_due() const { return next_ == script_.size() ? kNeverDue : script_[next_].stamp; }
 
+std::optional<hal::OperatorEvent> SimulatedPendant::poll(Instant now) {
+  const auto key = keys_.poll(now);
+  return key || hand_ == nullptr ? key : hand_->poll(now);
+}
+
+Instant SimulatedPendant::next_due() const {
+  return hand_ == nullptr ? keys_.next_due() : std::min(keys_.next_due(), hand_->next_due());
+}
+
 void SimulatedPendant::show(std::string_view line) {
+  if (hand_ != nullptr) hand_->read(line);
   length_ = std::min(line.size(), kLineMax);
   std::copy_n(line.begin(), length_, line_.begin());
   ++lines_;

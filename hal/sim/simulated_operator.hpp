@@ -8,6 +8,7 @@
 #include "hal/api/operator_devices.hpp"
 #include "hal/sim/faults.hpp"
 #include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/touching_hand.hpp"
 #include "platform/core/fixed_vector.hpp"
 
 namespace firstlook::sim {
@@ -37,9 +38,10 @@ class SimulatedPendant final : public hal::Pendant {
  public:
   static constexpr std::size_t kLineMax = 120;  // longer lines are cut, as a pendant's display does
 
-  explicit SimulatedPendant(const OperatorScript& script) : keys_(script) {}
-  [[nodiscard]] std::optional<hal::OperatorEvent> poll(Instant now) override { return keys_.poll(now); }
-  [[nodiscard]] Instant next_due() const override { return keys_.next_due(); }
+  /// @param hand  does what the lines ask for and confirms it; may be null. Must outlive the pendant
+  explicit SimulatedPendant(const OperatorScript& script, TouchingHand* hand = nullptr) : keys_(script), hand_(hand) {}
+  [[nodiscard]] std::optional<hal::OperatorEvent> poll(Instant now) override;
+  [[nodiscard]] Instant next_due() const override;
   void show(std::string_view line) override;
 
   [[nodiscard]] std::string_view shown() const { return {line_.data(), length_}; }
@@ -47,6 +49,7 @@ class SimulatedPendant final : public hal::Pendant {
 
  private:
   ScriptedKeys keys_;
+  TouchingHand* hand_;
   std::array<char, kLineMax> line_{};
   std::size_t length_ = 0;
   std::uint64_t lines_ = 0;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "algorithms/kinematics/self_collision.hpp"
 #include "platform/core/ensure.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
@@ -21,6 +22,21 @@ Vector6d difference(const Pose& truth, const Pose& estimate) {
 
 bool in_region(const NamedRegion& region, const Eigen::Vector3d& p) {
   return (p.array() >= region.low_m.array()).all() && (p.array() <= region.high_m.array()).all();
+}
+
+constexpr double kSurfaceTolerance = 1.5;  // voxels from a middle to matter in the next voxel
+
+/// Whether the voxel or one that touches it is marked.
+bool any_around(const GridGeometry& geometry, const Eigen::Vector3i& voxel, std::span<const std::uint8_t> marks) {
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        const Eigen::Vector3i at = voxel + Eigen::Vector3i(x, y, z);
+        if (geometry.contains(at) && marks[geometry.index(at)] != 0) return true;
+      }
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -114,7 +130,29 @@ void TruthGrader::grade_map(const FinalClaims& claims, TruthFigures& figures) {
   figures.observable_voxels = set.voxels;
   if (set.voxels > 0) figures.coverage_of_observable = static_cast<double>(known) / static_cast<double>(set.voxels);
   figures.false_free_voxels = false_free;
+  figures.false_occupied_fraction = false_occupied_fraction(claims);
   figures.regions = regions(claims);
+}
+
+double TruthGrader::false_occupied_fraction(const FinalClaims& claims) const {
+  const VoxelMap& map = *claims.map;
+  const GridGeometry& geometry = map.geometry();
+  std::vector<std::uint8_t> matter;
+  truth_.world->matter(geometry, matter);
+  std::size_t asked = 0, wrong = 0;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (!claims.reach_zone.empty() && claims.reach_zone[i] == 0) continue;
+    ++asked;
+    if (map.voxel_class(i) != VoxelClass::kOccupied) continue;
+    const Eigen::Vector3i voxel = geometry.voxel_at(i);
+    const bool base = std::ranges::any_of(truth_.arm.body, [&](const Capsule& capsule) {
+      const Eigen::Vector3d center_m = geometry.center_m(voxel);
+      const double within_m = capsule.radius_m + kSurfaceTolerance * geometry.resolution_m;
+      return capsule.link == 0 && segment_distance_m(center_m, center_m, capsule.a, capsule.b) < within_m;
+    });
+    wrong += !base && !any_around(geometry, voxel, matter) ? 1 : 0;
+  }
+  return asked == 0 ? 0 : static_cast<double>(wrong) / static_cast<double>(asked);
 }
 
 TruthFigures TruthGrader::grade(const FinalClaims& claims) {

@@ -58,6 +58,7 @@ class TruthGrader final : public Grader {
   void grade_alignment(const FinalClaims& claims, TruthFigures& figures) const;
   void grade_hand_eye(const FinalClaims& claims, TruthFigures& figures) const;
   void grade_map(const FinalClaims& claims, TruthFigures& figures);
+  [[nodiscard]] double false_occupied_fraction(const FinalClaims& claims) const;
 
   Truth truth_;
   ContactMonitor monitor_;

@@ -32,6 +32,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kBoardMoved,             2008, kRefusal,  "the board moved during the job",       "Fix the board and the cart, then start again.") \
   X(kCameraOnInnerLink,      2009, kRefusal,  "the camera is not on the last link",   "Mount the camera on the flange: only that is calibrated so far.") \
   X(kIntrinsicsUnknown,      2010, kRefusal,  "the views do not determine the camera's intrinsics", "Add views that are tilted by 20 to 40 degrees to all sides and cover the whole picture, or give a camera_info.yaml.") \
+  X(kTouchesUnusable,        2011, kRefusal,  "the touches do not determine where the board is", "Touch three corners or more that are not on a line; tilt the arm to different sides between touches, or give the tip's offset.") \
   X(kMapTooLarge,            3001, kRefusal,  "the map does not fit its memory",      "Choose a coarser resolution or smaller extents.") \
   X(kFrameRefused,           3002, kNotice,   "depth frame refused",                  "Check the depth stream: size, scale and time stamps.") \
   X(kMapUnreadable,          3003, kRefusal,  "map file unreadable",                  "Use a .bt or .ot file that OctoMap can read.") \
@@ -52,6 +53,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kClockWrong,             5010, kStop,     "a camera's time stamps do not fit the arm's", "Set the camera's clock and latency: the arm's pose at the time of a frame must be known.") \
   X(kStreamFrozen,           5011, kStop,     "a camera repeats one picture",         "Restart the camera, check its cable and power, then press start again.") \
   X(kTookTooLong,            5012, kStop,     "the job took longer than three hours", "See in the report which phase took so long.") \
+  X(kTouchTestEnded,         5013, kStop,     "the touch test was not carried on", "Lead the tip onto the corner that the pendant names and confirm, within 10 minutes each; at the end bring the arm back into the safe zone.") \
   X(kConfigUnreadable,       6001, kRefusal,  "configuration not readable",           "Correct the file; `firstlook config --defaults` shows every key.") \
   X(kConfigUnknownKey,       6002, kRefusal,  "unknown configuration key",            "Correct the key; `firstlook config --defaults` shows every key.") \
   X(kConfigBadValue,         6003, kRefusal,  "configuration value out of range",     "Correct the value; `firstlook config --defaults` shows the defaults.") \

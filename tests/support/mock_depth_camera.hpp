@@ -15,16 +15,17 @@ class MockDepthCamera final : public MockStream<hal::DepthCamera> {
       : MockStream(intrinsics, period) {}
 
   double wall_m = 1.5;
+  double stated_units_per_m = 1000;  ///< what it says; pictures come in millimetres
   std::function<void(const hal::Frame&, ImageView<std::uint16_t>)> paint;  ///< none: the wall
 
-  [[nodiscard]] double units_per_m() const override { return 1000; }
+  [[nodiscard]] double units_per_m() const override { return stated_units_per_m; }
   [[nodiscard]] Status read(const hal::Frame& frame, ImageView<std::uint16_t> image) override {
     if (!holds(frame)) return failure(Fault::kFrameGone, "depth frame {}", frame.sequence);
     if (!fits(image)) return failure(Fault::kFrameRefused, "wrong size");
     if (paint) {
       paint(frame, image);
     } else {
-      std::ranges::fill(image.pixels(), static_cast<std::uint16_t>(wall_m * units_per_m() + 0.5));
+      std::ranges::fill(image.pixels(), static_cast<std::uint16_t>(wall_m * 1000 + 0.5));
     }
     return {};
   }

@@ -54,6 +54,11 @@ class ScriptedWorld : public DecisionSink {
     return r;
   }();
   ValidateResult validate{.accepted = true};
+  std::function<TouchTestResult(const TouchTestArguments&)> touch_test = [](const TouchTestArguments&) {
+    TouchTestResult r;
+    r.usable = r.agrees = true;
+    return r;
+  };
   VerificationViewResult verification_view = [] {
     VerificationViewResult r;
     r.found = r.target_met = true;
@@ -93,6 +98,22 @@ class ScriptedWorld : public DecisionSink {
   void press(hal::OperatorAction action, OperatorDevice device = OperatorDevice::kPendant) {
     machine.on_event(now, OperatorActed{device, action});
   }
+  /// A person leads the arm by hand, half a radian a second.
+  void lead(int joint, double by_rad) {
+    const int steps = static_cast<int>(std::ceil(std::abs(by_rad) / 0.004));
+    for (int i = 0; i < steps && !ended; ++i) {
+      position_[joint] += by_rad / steps;
+      tick();
+    }
+  }
+  void wait(double for_s) {
+    const Instant end = now + seconds(for_s);
+    while (now < end && !ended) tick();
+  }
+  [[nodiscard]] bool has_shown(const std::string& words) const {
+    return std::any_of(shown.begin(), shown.end(),
+                       [&](const std::string& line) { return line.find(words) != std::string::npos; });
+  }
   /// Steps of 8 ms until the state is entered, the job ends, or the time is over. Returns whether the state was
   /// reached.
   bool run_until(StateId state, double limit_s = 600) {
@@ -115,6 +136,7 @@ class ScriptedWorld : public DecisionSink {
   [[nodiscard]] bool was_in(StateId state) const {
     return std::find(visited.begin(), visited.end(), state) != visited.end();
   }
+  [[nodiscard]] const JointVector& position_rad() const { return position_; }
   void tick() {
     now = now + milliseconds(8);
     if (!devices) {
@@ -178,6 +200,8 @@ class ScriptedWorld : public DecisionSink {
         return pack(SummarizeResult{}, result);
       case JobKind::kForgetKnownFree:
         return pack(NoArguments{}, result);
+      case JobKind::kTouchTest:
+        return pack(touch_test(arguments_of<TouchTestArguments>(arguments)), result);
       case JobKind::kSeeOnTheWay:
         ++seen_on_the_way;
         return pack(WayResult{true, true}, result);

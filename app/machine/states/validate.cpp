@@ -12,6 +12,8 @@ Handled on_validate(Machine& m, const MachineEvent& event) {
   if (const auto result = m.result_of<ValidateResult>(JobKind::kValidate, event)) {
     if (!result->accepted) {
       m.conclude(Outcome::kCalibrationRejected, Fault::kCalibrationRejected);
+    } else if (!m.settings().touch_points.empty()) {
+      m.transition(StateId::kTouchTest);
     } else if (m.settings().scope == RunScope::kCalibrate) {
       m.conclude(Outcome::kDone, std::nullopt);
     } else {

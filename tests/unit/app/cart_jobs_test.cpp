@@ -1,6 +1,7 @@
 #include "app/jobs/cart_jobs.hpp"
 
 #include <catch2/catch.hpp>
+#include <limits>
 #include <memory>
 
 #include "algorithms/mapping/octree_writer.hpp"
@@ -416,6 +417,61 @@ TEST_CASE("a depth picture that repeats itself is frozen, one with hardly a retu
     CHECK_FALSE(integrate().frozen);
     CHECK_FALSE(integrate().frozen);
   }
+}
+
+TEST_CASE("broken frames and frames of an uncertain pose change nothing and are counted by kind", "[jobs][safety]") {
+  Bench bench;
+  bench.calibrate();
+  double wall_m = 1.2;
+  const auto integrate = [&](IntegrateArguments arguments) {
+    bench.depth().wall_m = wall_m += 0.01;
+    return bench.result_of<IntegrateResult>(JobKind::kIntegrate, arguments).used;
+  };
+  REQUIRE(integrate(bench.depth_look(kStart)));
+  const VoxelCounts before = bench.bench().map().counts();
+  const auto refused = [&](FrameFlaw flaw) { return bench.bench().frames_refused()[static_cast<std::size_t>(flaw)]; };
+
+  IntegrateArguments nowhere = bench.depth_look(kStart);
+  nowhere.frame.at_rad[2] = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(integrate(nowhere));
+  CHECK(refused(FrameFlaw::kBadPose) == 1);
+
+  IntegrateArguments early = bench.depth_look(kStart);
+  early.frame.frame.stamp = Instant{} + milliseconds(1);
+  CHECK_FALSE(integrate(early));
+  CHECK(refused(FrameFlaw::kStampBackwards) == 1);
+
+  IntegrateArguments gone = bench.depth_look(kStart);
+  gone.frame.frame.sequence += 5;
+  CHECK_FALSE(integrate(gone));
+  CHECK(refused(FrameFlaw::kUnreadable) == 1);
+
+  IntegrateArguments blurred = bench.depth_look(kStart);
+  blurred.frame.velocity_rad_s = JointVector{0.3, 0, 0, 0, 0, 0};
+  blurred.frame.reports_apart_s = 0.3;  // reports were lost
+  CHECK_FALSE(integrate(blurred));
+  CHECK(refused(FrameFlaw::kPoseUncertain) == 1);
+
+  for (const double units_per_m : {1.0, 1e6}) {
+    bench.depth().stated_units_per_m = units_per_m;
+    CHECK_FALSE(integrate(bench.depth_look(kStart)));
+  }
+  CHECK(refused(FrameFlaw::kWrongScale) == 2);
+  bench.depth().stated_units_per_m = 1000;
+
+  CHECK(bench.bench().map().counts() == before);
+  CHECK(bench.bench().frames_integrated() == 1);
+  bench.depth().paint = [](const hal::Frame&, ImageView<std::uint16_t> image) {
+    std::ranges::fill(image.pixels(), std::uint16_t{65535});
+  };
+  CHECK(integrate(bench.depth_look(kStart)));
+  CHECK(bench.bench().map().counts() == before);  // infinity clears nothing
+  CHECK(bench.bench().infinite_pixels() == 64 * 48);
+  bench.depth().paint = nullptr;
+  blurred = bench.depth_look(kStart);
+  blurred.frame.velocity_rad_s = JointVector{0.3, 0, 0, 0, 0, 0};
+  blurred.frame.reports_apart_s = 0.008;
+  CHECK(integrate(blurred));
 }
 
 TEST_CASE("a prior map makes nothing known and changes no class", "[jobs]") {

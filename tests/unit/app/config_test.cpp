@@ -64,10 +64,18 @@ Config all_changed() {
                    1.4,
                    0.02,
                    0.5,
+                   "yes",
+                   13,
+                   "given",
+                   {0.1, 0.2, 0.3},
+                   0.6,
+                   6,
+                   11,
                    "runs/first: one/hand_eye.yaml",
                    4};
-  c.depth = {0.4, 6, 3.5, 0.003};
-  c.map = {0.02, {-1, -1, 0}, {1, 1, 1}, 60, "ignore", "earlier/map.ot"};
+  c.depth = {"stereo", 0.4, 6, 3.5, 0.001, 0.003, 0.06, 4, 0.03};
+  c.map = {0.02,           {-1, -1, 0},     {1, 1, 1},       60, 30, 0.002, "clear_when_corroborated", 0.01,
+           {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, "earlier/map.ot"};
   c.explore = {61, 401, 2001, 9, 3};
   c.clearance = {0.001, 0.002, 0.03, 4};
   c.memory = {512};
@@ -156,10 +164,52 @@ TEST_CASE("rules between keys hold", "[config]") {
   CHECK_THAT(refused("map: {low_m: [2, -1, 0]}", Fault::kConfigBadValue), Contains("map.low_m"));
   CHECK_THAT(refused("depth: {range_min_m: 3.5}", Fault::kConfigBadValue), Contains("range_trusted_m"));
   CHECK_THAT(refused("depth: {range_max_m: 2}", Fault::kConfigBadValue), Contains("range_max_m"));
+  CHECK_THAT(refused("depth: {crop_m: 0.4}", Fault::kConfigBadValue), Contains("crop_m"));
+  CHECK_THAT(refused("depth: {filter_voxel_m: 0.001}", Fault::kConfigBadValue), Contains("filter_voxel_m"));
+  CHECK_THAT(refused("map: {fine_resolution_m: 0.05}", Fault::kConfigBadValue), Contains("fine_resolution_m"));
+  CHECK_THAT(refused("map: {fine_resolution_m: 0.01}", Fault::kConfigBadValue), Contains("one fine voxel"));
+  CHECK_THAT(
+      refused("map: {fine_resolution_m: 0.01, fine_low_m: [0, 0, 1], fine_high_m: [1, 1, 2]}", Fault::kConfigBadValue),
+      Contains("inside"));
   CHECK_THAT(refused("calibration: {views_min: 31}", Fault::kConfigBadValue), Contains("views_max"));
   CHECK_THAT(refused("calibration: {views: fixed48}", Fault::kConfigBadValue), Contains("views_max to 52"));
   CHECK_THAT(refused("calibration: {views_min: 6}", Fault::kConfigBadValue), Contains("holdout_views"));
   CHECK_THAT(refused("keep_out: [{low_m: [1,0,0], high_m: [0,1,1]}]", Fault::kConfigBadValue), Contains("keep_out"));
+}
+
+TEST_CASE("a sensor sets the figures that no key sets, whichever source names it", "[config]") {
+  const Result<Config> stereo = parse_config("depth: {range_trusted_m: 2.5, sensor: stereo}", "cart.yaml");
+  REQUIRE(stereo);
+  CHECK(stereo->depth.range_trusted_m == 2.5);
+  CHECK(stereo->depth.range_min_m == 0.2);
+  CHECK(stereo->depth.range_max_m == 10);
+  CHECK(stereo->depth.baseline_m == 0.05);
+
+  const auto file = std::filesystem::temp_directory_path() / "firstlook_sensor_test.yaml";
+  std::ofstream(file) << "depth: {range_max_m: 4.2}\n";
+  ConfigSources sources;
+  sources.system_file = "/nowhere/firstlook.yaml";
+  sources.file = file;
+  sources.environment = {"FIRSTLOOK_DEPTH_SENSOR=time_of_flight"};
+  const Result<LoadedConfig> loaded = load_config(sources);
+  REQUIRE(loaded);
+  CHECK(loaded->config.depth.range_max_m == 4.2);
+  CHECK(loaded->config.depth.noise_floor_m == 0.0013);
+  CHECK(loaded->config.depth.baseline_m == 0);
+  for (const double z_m : {1.0, 2.0, 4.0}) {  // Fankhauser et al. 2015
+    CHECK(loaded->config.depth.sigma_m(z_m) == Approx(1e-3 * (1.5 - 0.5 * z_m + 0.3 * z_m * z_m)).margin(1e-4));
+  }
+
+  CHECK_THAT(refused("depth: {sensor: sonar}", Fault::kConfigBadValue), Contains("kinect, xtion, time_of_flight"));
+  CHECK_THAT(refused("depth: {sensor: xtion, range_min_m: 3.2}", Fault::kConfigBadValue), Contains("range_trusted_m"));
+  Config by_default;
+  set_sensor(*find_sensor_preset("kinect"), by_default.depth);
+  CHECK(by_default == Config{});
+  for (const SensorPreset& preset : sensor_presets()) {
+    Config config;
+    set_sensor(preset, config.depth);
+    CHECK(broken_rule(config).empty());
+  }
 }
 
 TEST_CASE("broken YAML is refused with its place, never thrown", "[config]") {

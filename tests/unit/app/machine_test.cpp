@@ -516,6 +516,191 @@ TEST_CASE("a pause while verifying goes on with the views that are missing", "[m
   CHECK(world.ending.outcome == Outcome::kDone);
 }
 
+namespace {
+
+/// A job that asks for three corners, up to where a person is asked to touch the first.
+MachineSettings with_touch_test(RunScope scope = RunScope::kEverything) {
+  MachineSettings settings = with_scope(scope);
+  for (const int point : {0, 8, 45}) settings.touch_points.push_back(point);
+  settings.touch_columns = 9;
+  settings.touch_time_max_s = 60;
+  return settings;
+}
+
+void run_to_touch_test(ScriptedWorld& world) {
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kTouchTest));
+}
+
+void touch_corners(ScriptedWorld& world, int corners) {
+  for (int i = 0; i < corners; ++i) {
+    world.lead(1, 0.1);
+    world.wait(1);
+    world.press(OperatorAction::kConfirm);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a person touches the corners asked for and brings the arm back; firstlook moves nothing meanwhile",
+          "[machine]") {
+  ScriptedWorld world(with_touch_test());
+  std::vector<TouchedPoint> touches;
+  world.touch_test = [&](const TouchTestArguments& a) {
+    touches.assign(a.touches.begin(), a.touches.end());
+    TouchTestResult r;
+    r.usable = r.agrees = true;
+    return r;
+  };
+  run_to_touch_test(world);
+  CHECK(world.has_shown("touch 1 of 3: lead the tip onto column 0, row 0"));
+  const std::size_t segments = world.segments.size();
+  const JointVector home = world.position_rad();
+  world.guardian_margin_m = -0.5;  // far outside of what is known free: it is not firstlook that moves
+  touch_corners(world, 3);
+  CHECK(world.has_shown("touch 2 of 3: lead the tip onto column 8, row 0"));
+  CHECK(world.has_shown("touch 3 of 3: lead the tip onto column 0, row 5"));
+  CHECK(world.has_shown("bring the arm back"));
+  world.lead(1, -0.3);
+  world.wait(1);
+  CHECK(world.machine.state() == StateId::kTouchTest);
+  CHECK(world.segments.size() == segments);
+  CHECK(world.stops.empty());
+  CHECK(touches.empty());
+  world.guardian_margin_m = 0.1;
+  const int forgotten = world.forgotten;
+  world.press(OperatorAction::kConfirm);
+  REQUIRE(world.run_until(StateId::kSweep, 5));
+  CHECK(world.forgotten == forgotten + 1);
+  REQUIRE(touches.size() == 3);
+  CHECK(touches[2].point == 45);
+  for (int i = 0; i < 3; ++i) {
+    CHECK(touches[static_cast<std::size_t>(i)].at_rad[1] - home[1] == Approx(0.1 * (i + 1)).margin(1e-9));
+  }
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+}
+
+TEST_CASE("a touch counts when the arm stands still, and once", "[machine]") {
+  ScriptedWorld world(with_touch_test(RunScope::kCalibrate));
+  std::size_t touches = 0;
+  world.touch_test = [&](const TouchTestArguments& a) {
+    touches = a.touches.size();
+    TouchTestResult r;
+    r.usable = r.agrees = true;
+    return r;
+  };
+  run_to_touch_test(world);
+  world.lead(0, 0.2);
+  world.press(OperatorAction::kConfirm);
+  CHECK(world.has_shown("must stand still"));
+  CHECK_FALSE(world.has_shown("touch 2 of 3"));
+  touch_corners(world, 1);
+  CHECK(world.has_shown("touch 2 of 3"));
+  world.press(OperatorAction::kConfirm);
+  CHECK(world.has_shown("still stands where it touched the last corner"));
+  CHECK_FALSE(world.has_shown("touch 3 of 3"));
+  touch_corners(world, 2);
+  world.press(OperatorAction::kPlay);  // of no meaning here
+  world.wait(1);
+  world.press(OperatorAction::kConfirm);
+  REQUIRE(world.run_to_end());
+  CHECK(touches == 3);
+  CHECK(world.ending.outcome == Outcome::kDone);
+  CHECK_FALSE(world.was_in(StateId::kSweep));
+}
+
+TEST_CASE("an arm that is not brought back moves nothing: asked again, then the job ends", "[machine]") {
+  ScriptedWorld world(with_touch_test());
+  run_to_touch_test(world);
+  touch_corners(world, 3);
+  const auto plan = world.plan;
+  world.plan = [](const PlanArguments&) {
+    return PlanResult{.found = false, .fault = Fault::kStartBlocked, .path = {}};
+  };
+  const std::size_t segments = world.segments.size();
+  world.wait(1);
+  world.press(OperatorAction::kConfirm);
+  world.wait(1);
+  CHECK(world.machine.state() == StateId::kTouchTest);
+  CHECK(world.has_shown("bring the arm into the safe zone"));
+  SECTION("brought back in the end") {
+    world.plan = plan;
+    world.press(OperatorAction::kConfirm);
+    CHECK(world.run_until(StateId::kSweep, 5));
+    REQUIRE(world.run_to_end());
+    CHECK(world.ending.outcome == Outcome::kDone);
+  }
+  SECTION("left where it is") {
+    REQUIRE(world.run_to_end(100));
+    CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+    CHECK(world.ending.fault == Fault::kTouchTestEnded);
+    CHECK(world.segments.size() == segments);
+  }
+}
+
+TEST_CASE("nobody who touches, a stop, and a pause in which the arm is led", "[machine]") {
+  ScriptedWorld world(with_touch_test());
+  run_to_touch_test(world);
+  touch_corners(world, 1);
+  const std::size_t segments = world.segments.size();
+  SECTION("nobody: after its time the job ends where the arm is") {
+    REQUIRE(world.run_to_end(100));
+    CHECK(world.ending.outcome == Outcome::kSafelyStopped);
+    CHECK(world.ending.fault == Fault::kTouchTestEnded);
+    CHECK(world.segments.size() == segments);
+  }
+  SECTION("stop") {
+    world.press(OperatorAction::kStop);
+    CHECK(world.ended);
+    CHECK(world.ending.fault == Fault::kProgramStopped);
+    CHECK(world.segments.size() == segments);
+  }
+  SECTION("a protective stop while somebody leads the arm") {
+    world.safety = hal::ArmSafety::kProtectiveStop;
+    world.tick();
+    CHECK(world.ending.fault == Fault::kProtectiveStop);
+  }
+  SECTION("a pause longer than the time for a corner, the arm led meanwhile: touches stay") {
+    world.press(OperatorAction::kPause);
+    world.consent = false;
+    CHECK(world.machine.state() == StateId::kPaused);
+    world.lead(2, 0.2);
+    world.wait(70);
+    CHECK(world.machine.state() == StateId::kPaused);
+    world.consent = true;
+    REQUIRE(world.run_until(StateId::kTouchTest, 1));
+    touch_corners(world, 2);
+    world.lead(2, -0.2);
+    world.wait(1);
+    CHECK(world.segments.size() == segments);
+    world.press(OperatorAction::kConfirm);
+    CHECK(world.run_until(StateId::kSweep, 5));
+  }
+}
+
+TEST_CASE("touches that contradict the calibration, or tell nothing, map nothing", "[machine]") {
+  const bool usable = GENERATE(true, false);
+  ScriptedWorld world(with_touch_test());
+  world.touch_test = [usable](const TouchTestArguments&) {
+    TouchTestResult r;
+    r.usable = usable;
+    r.fault = Fault::kTouchesUnusable;
+    return r;
+  };
+  run_to_touch_test(world);
+  touch_corners(world, 3);
+  world.wait(1);
+  world.press(OperatorAction::kConfirm);
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kCalibrationRejected);
+  CHECK(world.ending.fault == (usable ? Fault::kCalibrationRejected : Fault::kTouchesUnusable));
+  CHECK(world.was_in(StateId::kPark));
+  CHECK_FALSE(world.was_in(StateId::kSweep));
+  CHECK(world.plans_for(MotionPhase::kMapping) == 0);
+}
+
 TEST_CASE("the state table is sound", "[machine]") {
   std::set<std::string_view> names;
   for (const StateRow& row : state_table()) {

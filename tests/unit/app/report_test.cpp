@@ -72,8 +72,8 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(hand_eye["covariance"].size() == 36);
   CHECK(hand_eye["reasons"].is_array());
 
-  CHECK(keys_of(json["mapping"]) ==
-        Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "remaining", "prior", "objects"});
+  CHECK(keys_of(json["mapping"]) == Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "fine", "holes",
+                                         "occupied_forgotten", "remaining", "prior", "objects"});
   CHECK(keys_of(json["mapping"]["prior"]) == Keys{"still_occupied", "newly_occupied", "gone", "still_free",
                                                   "unseen_occupied", "unseen_free", "first_known"});
   CHECK(json["mapping"]["prior"]["gone"] == 75);
@@ -94,7 +94,7 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2",
                                        "depth_camera_error_mm", "depth_camera_error_mrad", "color_stamps_error_s",
                                        "depth_stamps_error_s", "contacts", "unknown_entries", "coverage_of_observable",
-                                       "false_free_voxels", "regions"});
+                                       "false_free_voxels", "false_occupied_fraction", "regions"});
 }
 
 TEST_CASE("what was found of depth camera and stamps is told, and what was not", "[report]") {

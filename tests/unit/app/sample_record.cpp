@@ -129,7 +129,8 @@ MappingRecord mapping() {
        .box = {{0.9, 0.1, 0}, {0.4, 0.3, 0.3}, Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()))}}};
   m.objects.specks = 21;
   m.frames_integrated = 412;
-  m.frames_dropped = 3;
+  m.frames_refused[static_cast<std::size_t>(FrameFlaw::kPoseUnknown)] = 2;
+  m.frames_refused[static_cast<std::size_t>(FrameFlaw::kPoseUncertain)] = 1;
   return m;
 }
 
@@ -222,7 +223,8 @@ RunRecord make_record() {
   r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
             "runs/20260131-7",      2};
   r.alignment = alignment();
-  r.truth = TruthRecord{0.21, 0.34, 4.7, 0.3, 0.4, 1e-5, -3e-4, 0, 0, 0.972, 41, {{"behind_box", 500, 0.12, 0.93}}};
+  r.truth =
+      TruthRecord{0.21, 0.34, 4.7, 0.3, 0.4, 1e-5, -3e-4, 0, 0, 0.972, 41, 0.003, {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }
 

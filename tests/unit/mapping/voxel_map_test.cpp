@@ -258,4 +258,57 @@ TEST_CASE("a map of log-odds only never calls anything free for motion", "[mappi
   CHECK(mask == std::vector<std::uint8_t>(64, 0));
 }
 
+TEST_CASE("occupied voxels that nobody saw for too long become unknown, never free", "[mapping][safety]") {
+  SmallMap m;
+  m.hit(0, pose_at(0), 10);
+  m.hit(1, pose_at(0), 10);
+  m.miss(2, pose_at(0), 10);
+  m.miss(2, pose_at(0.1), 10);
+  m.hit(1, pose_at(0), 40);
+  CHECK(m.map.forget_old_occupied(40, 30) == 0);  // not yet older
+  CHECK(m.map.forget_old_occupied(41, 30) == 1);
+  CHECK(m.map.voxel_class(0) == VoxelClass::kUnknown);
+  CHECK(m.map.voxel_class(1) == VoxelClass::kOccupied);
+  CHECK(m.map.voxel_class(2) == VoxelClass::kFree);  // free space ages on its own (known_free)
+  CHECK_FALSE(m.map.known_free(0, 41, kMaxAge_s));
+  // What was forgotten is as if never seen: two poses again.
+  m.miss(0, pose_at(0), 42);
+  CHECK_FALSE(m.map.known_free(0, 42, kMaxAge_s));
+  m.miss(0, pose_at(0.1), 43);
+  CHECK(m.map.known_free(0, 43, kMaxAge_s));
+}
+
+TEST_CASE("a hit that took a piece of the safe zone away counts on when the voxel is forgotten", "[mapping][safety]") {
+  SmallMap m;
+  m.map.set_safe_zone({.radius_m = 1, .height_m = 1, .floor_m = 0});
+  REQUIRE(m.map.in_intact_safe_zone(0));
+  m.hit(0, pose_at(0), 10);
+  REQUIRE(m.map.forget_old_occupied(100, 30) == 1);
+  CHECK_FALSE(m.map.in_intact_safe_zone(0));
+}
+
+TEST_CASE("open rays clear with a second pose only, and neither what was hit nor what is suspect",
+          "[mapping][safety]") {
+  VoxelMap map({0.05, {0, 0, 0}, {4, 4, 4}}, VoxelMap::Planes::kWithOpenRays);
+  const auto open = [&](const Transform<Base, Depth>& pose, double stamp_s) {
+    std::vector<std::uint64_t> passed(1, 0b1111);
+    map.apply_open(passed, pose, stamp_s);
+    return passed[0];
+  };
+  const std::vector<std::uint64_t> none(1, 0), second(1, 0b0010), third(1, 0b0100);
+  map.apply(none, second, pose_at(0), 1);
+  map.suspect(third);
+  CHECK(open(pose_at(0), 2) == 0);
+  CHECK(open(pose_at(0.001), 3) == 0);
+  CHECK(open(pose_at(0.1), 4) == 0b1001);
+  CHECK(map.voxel_class(0) == VoxelClass::kFree);
+  CHECK(map.voxel_class(1) == VoxelClass::kOccupied);
+  CHECK(map.voxel_class(2) == VoxelClass::kUnknown);
+  // A surface stays in a voxel whose log-odds say free.
+  for (int i = 0; i < 5; ++i) map.apply(second, none, pose_at(0), 5);
+  map.note_surface(1, 3);
+  REQUIRE(map.voxel_class(1) == VoxelClass::kFree);
+  CHECK(open(pose_at(0.2), 6) == 0b1001);
+}
+
 }  // namespace firstlook

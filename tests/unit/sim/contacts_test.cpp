@@ -128,6 +128,29 @@ TEST_CASE("inside the intact safe zone nothing counts, outside of it the same vo
   CHECK(grown <= 8);  // all the voxels there are
 }
 
+TEST_CASE("where the upper arm begins inside the shoulder, the base allowance excuses both; farther out neither",
+          "[sim][contacts]") {
+  const BoxWorld world;
+  const JointVector from = stretched(0), to = stretched(0.5);
+  const Pose upper_arm = forward(kArm, to).base_T_link[2];
+  const Capsules body = true_capsules(kArm, kArm.joints, kMount.pose());
+  const Capsule& upper = *std::ranges::find_if(body, [](const Capsule& c) { return c.link == 2; });
+  // The voxel below a place on the upper arm's axis, by less than its radius.
+  const auto entries_below = [&](double part) {
+    TestView view;
+    const Eigen::Vector3d on_axis = upper_arm * Eigen::Vector3d(upper.a + part * (upper.b - upper.a));
+    const Eigen::Vector3d below = on_axis - Eigen::Vector3d(0, 0, upper.radius_m - 0.005);
+    view.free[view.grid.index(view.grid.voxel(below))] = 0;
+    ContactMonitor monitor = monitor_in(world);
+    monitor.watch(&view);
+    static_cast<void>(monitor.body_moved(Instant{}, from, to));
+    return monitor.unknown_entries();
+  };
+  CHECK(entries_below(0) == 0);
+  CHECK(entries_below(0.4) > 0);
+  CHECK(entries_below(0.8) > 0);
+}
+
 TEST_CASE("a voxel counts when the capsule overlaps its box, not when it only touches it", "[sim][contacts]") {
   const GridGeometry grid = GridGeometry::covering({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 0.1);
   const auto count = [&](const Capsule& capsule) {
@@ -192,5 +215,31 @@ TEST_CASE("the camera's housing lies inside what the program takes for it", "[si
     CHECK(std::ranges::any_of(program.capsules, [&](const Capsule& c) {
       return c.link == kArm.joints && segment_distance_m(c.a, c.b, p, p) <= c.radius_m;
     }));
+  }
+}
+
+TEST_CASE("what a person leads the arm into is not the program's doing; moving off from there is", "[sim][contacts]") {
+  BoxWorld world;
+  const Eigen::Vector3d post = camera_at(stretched(0.8));
+  world.boxes.push_back({post - Eigen::Vector3d(0.005, 0.005, 0.03), post + Eigen::Vector3d(0.005, 0.005, 0.03)});
+  TestView view;
+  for (std::size_t i = 0; i < view.free.size(); ++i) {
+    if ((view.grid.center_m(view.grid.voxel_at(i)) - post).norm() < 0.1) view.free[i] = 0;
+  }
+  ContactMonitor monitor = monitor_in(world);
+  monitor.watch(&view);
+  CHECK_FALSE(monitor.body_moved(Instant{}, stretched(0), stretched(0.01)));
+  REQUIRE(monitor.unknown_entries() == 0);
+  for (int i = 0; i < 10; ++i) monitor.body_led();  // into the post, and there it stays
+  CHECK(monitor.contacts() == 0);
+  SECTION("brought back") {
+    CHECK_FALSE(monitor.body_moved(Instant{}, stretched(0), stretched(0.01)));
+    CHECK(monitor.contacts() == 0);
+    CHECK(monitor.unknown_entries() == 0);
+  }
+  SECTION("left there: the first motion of the program's own counts") {
+    CHECK(monitor.body_moved(Instant{}, stretched(0.8), stretched(0.801)));
+    CHECK(monitor.contacts() == 1);
+    CHECK(monitor.unknown_entries() > 0);
   }
 }

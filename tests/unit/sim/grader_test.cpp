@@ -124,3 +124,28 @@ TEST_CASE("coverage counts observable voxels that the map knows, false free thos
   CHECK(*half.coverage_of_observable == Approx(0.5).margin(0.15));
   CHECK(*half.false_free_voxels == 2);
 }
+
+TEST_CASE("false occupied counts voxels away from every surface, inside the reach zone only", "[sim][grader]") {
+  BoxWorld world;
+  world.add_room({-1.2, -1.2, -0.2}, {1.2, 1.2, 1.4});
+  TruthGrader grader(truth_in(world));
+  VoxelMap map(coarse_grid());
+  const GridGeometry& g = map.geometry();
+  std::vector<std::uint8_t> zone(map.size());
+  std::size_t in_zone = 0;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    zone[i] = g.center_m(g.voxel_at(i)).x() < 0.5 ? 1 : 0;
+    in_zone += zone[i];
+  }
+  const auto occupy = [&](const Eigen::Vector3d& at_m) { map.set(g.index(g.voxel(at_m)), VoxelClass::kOccupied, 5); };
+  const double half_m = g.resolution_m / 2;
+  occupy({-0.7, 0.3, 0.8});           // in the middle of the room: wrong
+  occupy({0.8, 0.3, 0.8});            // the same out of reach: not asked
+  occupy({-1.2 + half_m, 0.3, 0.8});  // before the wall: within the tolerance
+  occupy({0, 0, 0.01});               // the arm's own base
+  FinalClaims claims;
+  claims.map = &map;
+  claims.reach_zone = zone;
+  claims.observable = coarse();
+  CHECK(*grader.grade(claims).false_occupied_fraction == Approx(1.0 / static_cast<double>(in_zone)));
+}

@@ -1,0 +1,60 @@
+/// Kinds of sensor and options of the map, through the whole program.
+#include "tests/support/job_run.hpp"
+
+namespace firstlook {
+using test::check_safe;
+using test::JobFolder;
+using test::Json;
+using test::ProgramResult;
+
+namespace {
+
+/// A job with a short exploration and these keys besides.
+Json run_with(const std::string& config) {
+  const JobFolder folder;
+  folder.write("keys.yaml", "explore: {views_max: 3}\n" + config);
+  const ProgramResult run = folder.run_job("run", {"--config", "keys.yaml"});
+  INFO(config << "\n" << run.err);
+  CHECK(run.exit_code == 0);
+  Json result = folder.read_json("run/result.json");
+  check_safe(result);
+  CHECK(result["truth"]["false_free_voxels"] == 0);
+  CHECK(folder.run({"replay", "run/journal.flj"}).exit_code == 0);
+  if (!result["mapping"]["fine"].is_null())
+    CHECK(folder.read("run/fine_map.bt").starts_with("# Octomap OcTree binary"));
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("every kind of depth sensor maps a cell", "[scenario]") {
+  for (const std::string sensor : {"xtion", "time_of_flight", "stereo"}) {
+    INFO(sensor);
+    const Json result = run_with("depth: {sensor: " + sensor + "}\n");
+    CHECK(result["mapping"]["voxels"]["free"].get<int>() > 5000);
+    CHECK(result["mapping"]["frames"]["refused"]["wrong_scale"] == 0);
+    CHECK(result["hand_eye"]["verdict"] == "accepted");
+  }
+}
+
+TEST_CASE("options of the map are off by default and do what they say", "[scenario]") {
+  const Json plain = run_with("");
+  CHECK(plain["mapping"]["fine"].is_null());
+  CHECK(plain["mapping"]["holes"]["policy"] == "ignore");
+  CHECK(plain["mapping"]["holes"]["pixels_open"] == 0);
+  CHECK(plain["mapping"]["occupied_forgotten"] == 0);
+  CHECK(plain["mapping"]["frames"]["pixels_left_out"] == 0);
+
+  const Json all = run_with(
+      "depth: {crop_m: 2.5, filter_voxel_m: 0.01}\n"
+      "map: {occupied_max_age_s: 20, fine_resolution_m: 0.01, fine_low_m: [0.6, -0.3, -0.1], fine_high_m: [1.2, 0.3, "
+      "0.5]}\n");
+  CHECK(all["mapping"]["frames"]["pixels_left_out"].get<int>() > 1000);
+  CHECK(all["mapping"]["occupied_forgotten"].get<int>() > 10);
+  CHECK(all["mapping"]["fine"]["resolution_m"] == 0.01);
+  const Json& fine = all["mapping"]["fine"]["voxels"];
+  CHECK(fine["free"].get<int>() + fine["occupied"].get<int>() + fine["unknown"].get<int>() == 60 * 60 * 60);
+  CHECK(fine["free"].get<int>() > 10000);
+}
+
+}  // namespace firstlook
