@@ -1,4 +1,4 @@
-/// The adapter to OpenCV's threshold, contours and polygons: its types and exceptions end here.
+/// The adapter to OpenCV's filters and polygons: its types and exceptions end here.
 #include "algorithms/vision/marker_quads.hpp"
 
 #include <Eigen/Cholesky>
@@ -10,6 +10,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <span>
+
+#include "algorithms/vision/dark_outlines.hpp"
 
 namespace firstlook {
 namespace {
@@ -50,16 +52,10 @@ std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_m
 }
 
 void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
-  constexpr double kDarker = 7;  // grey levels below the mean of the window
-  cv::Mat dark;
-  cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
-  std::vector<std::vector<cv::Point>> contours;
-  std::vector<cv::Vec4i> tree;
-  cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  for (std::size_t i = 0; i < contours.size(); ++i) {
-    constexpr int kParent = 3;
-    if (tree[i][kParent] >= 0) continue;  // the inner edge of a dark ring
-    const auto quad = quad_of(contours[i], side_min_px);
+  // No side is longer than the diagonal of the box.
+  const auto may_be = [&](cv::Size box) { return std::hypot(box.width - 1, box.height - 1) >= side_min_px; };
+  for (const auto& outline : dark_outlines(image, window_px, may_be)) {
+    const auto quad = quad_of(outline, side_min_px);
     if (!quad) continue;
     const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
     if (std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q, near_px); })) {
@@ -100,6 +96,19 @@ struct Side {
   [[nodiscard]] Eigen::Vector2d tangent(double t) const { return along + (f[1] + 2 * t * f[2]) * outward; }
 };
 
+/// Grey value between the centres of pixels, (u, v) at least 0 and less than the last pixel's centre.
+double gray_inside(GrayImage image, double u, double v) {
+  const int u0 = static_cast<int>(u), v0 = static_cast<int>(v);
+  const double a = u - u0, b = v - v0;
+  const std::uint8_t* top = &image.at(u0, v0);
+  const std::uint8_t* low = top + image.width;
+  return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * low[0] + a * low[1]);
+}
+
+bool is_inside(GrayImage image, const Eigen::Vector2d& px) {
+  return px.x() >= 0 && px.y() >= 0 && px.x() < image.width - 1 && px.y() < image.height - 1;
+}
+
 struct EdgePoint {
   double t = 0, offset = 0;
   double rise = 0;  ///< grey levels from dark to white
@@ -113,11 +122,18 @@ std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t,
   const double middle = side.f[0] + t * (side.f[1] + t * side.f[2]);
   const Eigen::Vector2d on_line = side.start + t * side.along;
   const int steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
+  const auto at = [&](double offset) -> Eigen::Vector2d { return on_line + offset * side.outward; };
+  // All samples lie between the ends: the border needs no thought where these are inside.
+  const bool inside =
+      is_inside(image, at(middle - reach_px)) && is_inside(image, at(middle - reach_px + steps * kStep_px));
+  const auto gray = [&](const Eigen::Vector2d& px) {
+    return inside ? gray_inside(image, px.x(), px.y()) : gray_between(image, px);
+  };
   double sum = 0, moment = 0, rises = 0;
-  double before = gray_between(image, on_line + (middle - reach_px) * side.outward);
+  double before = gray(at(middle - reach_px));
   for (int i = 1; i <= steps; ++i) {
     const double offset = middle - reach_px + i * kStep_px;
-    const double here = gray_between(image, on_line + offset * side.outward);
+    const double here = gray(at(offset));
     const double rise = std::max(0.0, here - before);
     rises += rise;
     sum += rise;

@@ -286,19 +286,33 @@ Eigen::Vector2d square_corner(const BoardSpec& board, int column, int row, std::
   return board.square_size_m * Eigen::Vector2d(column + (k == 1 || k == 2 ? 1 : 0), row + (k >= 2 ? 1 : 0));
 }
 
+/// A marker that was found, and where it says that points near it are seen.
+struct MarkerPlane {
+  Eigen::Vector2d middle_m;  ///< on the board
+  Eigen::Matrix3d px_from_m;
+};
+
+std::vector<MarkerPlane> planes_of(const BoardSpec& board, const std::vector<SquareMarker>& markers) {
+  std::vector<MarkerPlane> planes;
+  for (const SquareMarker& m : markers) {
+    const Eigen::Vector2d middle_m = board.marker_origin(m.marker).array() + board.mark_size_m / 2;
+    if (const auto h = homography_of(board, {m})) planes.push_back({middle_m, *h});
+  }
+  return planes;
+}
+
 /// Where the markers beside a black square say that its corners are seen; empty when none of them was found.
-std::optional<Quad> predicted_square(const BoardSpec& board, const std::vector<SquareMarker>& markers, int column,
+std::optional<Quad> predicted_square(const BoardSpec& board, const std::vector<MarkerPlane>& planes, int column,
                                      int row) {
   Quad sum{};
   for (auto& corner : sum) corner.setZero();
   int count = 0;
-  const Eigen::Vector2d middle = board.square_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
-  for (const SquareMarker& m : markers) {
-    const Eigen::Vector2d at = board.marker_origin(m.marker).array() + board.mark_size_m / 2;
-    if ((at - middle).norm() > 1.1 * board.square_size_m) continue;
-    const auto h = homography_of(board, {m});
-    if (!h) continue;
-    for (std::size_t k = 0; k < 4; ++k) sum[k] += apply_homography(*h, square_corner(board, column, row, k));
+  const Eigen::Vector2d middle_m = board.square_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+  for (const MarkerPlane& plane : planes) {
+    if ((plane.middle_m - middle_m).norm() > 1.1 * board.square_size_m) continue;
+    for (std::size_t k = 0; k < 4; ++k) {
+      sum[k] += apply_homography(plane.px_from_m, square_corner(board, column, row, k));
+    }
     ++count;
   }
   if (count == 0) return std::nullopt;
@@ -311,12 +325,13 @@ std::optional<Quad> predicted_square(const BoardSpec& board, const std::vector<S
 /// off, opencv#25539).
 Result<CornerSet> charuco_corners(GrayImage image, const BoardSpec& board, const std::vector<SquareMarker>& markers) {
   constexpr double kAgreement_px = 1.0;
+  const std::vector<MarkerPlane> planes = planes_of(board, markers);
   std::vector<std::vector<Eigen::Vector2d>> seen(static_cast<std::size_t>(board.corners()));
   for (int row = -1; row < board.inner_rows; ++row) {
     for (int column = -1; column < board.inner_columns; ++column) {
       const Eigen::Vector2d middle = board.square_size_m * Eigen::Vector2d(column + 0.5, row + 0.02);
       if (!is_dark(board, middle.x(), middle.y())) continue;
-      auto square = predicted_square(board, markers, column, row);
+      auto square = predicted_square(board, planes, column, row);
       if (!square) continue;
       const Quad start = *square;
       const double side = side_px(start);
