@@ -133,6 +133,19 @@ Result<InsertionResult> Inserter::insert(VoxelMap& map, const DepthImage& depth,
   return result;
 }
 
+void Inserter::set_ground(const GroundPlane& ground) {
+  ENSURE(3127, ends_ == RayEnds::kPixels && std::isfinite(ground.height_m) && ground.tolerance_m > 0);
+  ground_ = ground;
+}
+
+void Inserter::drop_ground(const RayRow& row) {
+  const auto low_m = static_cast<float>(ground_->height_m - ground_->tolerance_m);
+  const auto top_m = static_cast<float>(ground_->top_m());
+  for (std::size_t u = 0; u < row_octant_.size(); ++u) {
+    if (row.end_z_m[u] >= low_m && row.end_z_m[u] <= top_m) row_octant_[u] = -1;
+  }
+}
+
 void Inserter::mark_hit(VoxelMap& map, std::int32_t octant) {
   if (octant < 0) return;
   const auto index = static_cast<std::size_t>(octant) >> 3;
@@ -143,6 +156,7 @@ void Inserter::mark_hit(VoxelMap& map, std::int32_t octant) {
 void Inserter::note_row(VoxelMap& map, int v, const RayRow& row) {
   end_octants(geometry_, row, row_octant_);
   (has_avx2() ? keep_rays_avx2 : keep_rays_portable)(row, row_octant_.data(), row_reach_m_.data());
+  if (ground_) drop_ground(row);
   image_.set_row(v, row_reach_m_);
   std::int32_t before = -1;  // neighbours often end in one place
   for (const std::int32_t octant : row_octant_) {

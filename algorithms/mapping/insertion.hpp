@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,15 @@ enum class RayEnds : std::uint8_t {
   kVoxelCenters,  ///< discretize = true: one to the centre of each voxel that holds a return; fewer and coarser
 };
 
+/// A level floor in base coordinates. What is seen within the tolerance of it clears the way there and marks nothing
+/// (the thesis's ground plane, appendix B): the map keeps no floor that a planner must avoid. Whoever moves by such a
+/// map must block what lies below the tolerance: rays that graze the floor clear its voxels.
+struct GroundPlane {
+  double height_m = 0;
+  double tolerance_m = 0;
+  [[nodiscard]] double top_m() const { return height_m + tolerance_m; }
+};
+
 /// Holds the scratch memory for frames of one sensor into maps of one geometry; all of it is taken at construction.
 class Inserter {
  public:
@@ -37,6 +47,9 @@ class Inserter {
                                                const Transform<Base, Depth>& base_T_depth,
                                                std::span<const float> self_depth_m, double stamp_s);
 
+  /// From now on; for one ray for each pixel only.
+  void set_ground(const GroundPlane& ground);
+
   [[nodiscard]] const DepthSensor& sensor() const { return sensor_; }
   /// The voxels that the last frame missed and hit, as VoxelMap::apply had them.
   [[nodiscard]] std::span<const std::uint64_t> missed() const { return missed_; }
@@ -45,6 +58,8 @@ class Inserter {
  private:
   [[nodiscard]] Status check_place(const Transform<Base, Depth>& base_T_depth, double stamp_s) const;
   void mark_hit(VoxelMap& map, std::int32_t octant);
+  /// Takes the hits on the floor out of the row.
+  void drop_ground(const RayRow& row);
   /// The row's reach, and its hits.
   void note_row(VoxelMap& map, int v, const RayRow& row);
   /// Two ways to the same marks: along every ray of any image, or by the voxels of a pinhole image (much faster).
@@ -62,6 +77,7 @@ class Inserter {
   double range_m_ = 0;  ///< where rays are cut: min(range_max_m, range_trusted_m)
   DepthRays rays_;      ///< of voxel centres: not cut, because the centres decide
   RangeImage image_;
+  std::optional<GroundPlane> ground_;
   std::vector<float> row_reach_m_;
   std::vector<std::int32_t> row_octant_;  ///< 8 * voxel + octant of each end; -1 outside the grid
   std::vector<std::uint64_t> missed_;

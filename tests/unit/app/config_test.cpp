@@ -166,6 +166,8 @@ TEST_CASE("rules between keys hold", "[config]") {
   CHECK_THAT(refused("depth: {range_max_m: 2}", Fault::kConfigBadValue), Contains("range_max_m"));
   CHECK_THAT(refused("depth: {crop_m: 0.4}", Fault::kConfigBadValue), Contains("crop_m"));
   CHECK_THAT(refused("depth: {filter_voxel_m: 0.001}", Fault::kConfigBadValue), Contains("filter_voxel_m"));
+  CHECK_THAT(refused("depth: {plane_fit_px: 4}", Fault::kConfigBadValue), Contains("plane_fit_px"));
+  CHECK_THAT(refused("map: {ground_tolerance_m: -0.1}", Fault::kConfigBadValue), Contains("ground_tolerance_m"));
   CHECK_THAT(refused("map: {fine_resolution_m: 0.05}", Fault::kConfigBadValue), Contains("fine_resolution_m"));
   CHECK_THAT(refused("map: {fine_resolution_m: 0.01}", Fault::kConfigBadValue), Contains("one fine voxel"));
   CHECK_THAT(

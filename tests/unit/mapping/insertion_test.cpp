@@ -298,6 +298,53 @@ TEST_CASE("a frame that cannot be right is refused and changes nothing", "[mappi
   CHECK_FALSE(refused(good, pose, {}, 1));
 }
 
+TEST_CASE("the ground clears the way to it and marks nothing", "[mapping]") {
+  Random random(21);
+  const GroundPlane ground{-0.62, 0.04};
+  const GridGeometry geometry = cube(2.5, 0.05);
+  const DepthSensor sensor = small_sensor(2.2);
+  Inserter plain(geometry, sensor), clearing(geometry, sensor);
+  clearing.set_ground(ground);
+  std::size_t dropped = 0, kept = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    // A floor with boxes on it, seen from above at a slant.
+    Frame frame = random_frame(random);
+    const double tilt_rad = random.uniform(2.2, 3.1);
+    frame.base_T_depth =
+        Transform<Base, Depth>(Eigen::Quaterniond(Eigen::AngleAxisd(random.uniform(0, 6.28), Eigen::Vector3d::UnitZ()) *
+                                                  Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitX())),
+                               {0, 0, random.uniform(0, 0.4)});
+    DepthRays rays(sensor);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const Eigen::Vector3d way = frame.base_T_depth.rotation() * rays.direction(u, v);
+        const double box_m = u > 30 && u < 50 && v > 20 && v < 40 ? 0.15 : 0.0;
+        const double z_m = (ground.height_m + box_m - frame.base_T_depth.translation().z()) / way.z();
+        frame.values[static_cast<std::size_t>(v * kWidth + u)] =
+            static_cast<std::uint16_t>(way.z() < 0 && z_m < 6 ? std::lround(1000 * z_m) : 0);
+      }
+    }
+    VoxelMap plain_map(geometry), clearing_map(geometry);
+    REQUIRE(plain.insert(plain_map, frame.image(), frame.base_T_depth, {}, 1));
+    REQUIRE(clearing.insert(clearing_map, frame.image(), frame.base_T_depth, {}, 1));
+    // From the ends themselves: what a return that is not on the floor hits.
+    std::vector<bool> expected(geometry.count(), false);
+    rays.for_each(frame.image(), frame.base_T_depth, {}, [&](const RayEnd& ray) {
+      const Eigen::Vector3i voxel = geometry.voxel(ray.end_m.cast<double>());
+      const bool floor = std::abs(static_cast<double>(ray.end_m.z()) - ground.height_m) <= ground.tolerance_m;
+      if (ray.is_hit && !floor && geometry.contains(voxel)) expected[geometry.index(voxel)] = true;
+    });
+    for (std::size_t i = 0; i < geometry.count(); ++i) {
+      REQUIRE((clearing_map.voxel_class(i) == VoxelClass::kOccupied) == expected[i]);
+      if (plain_map.voxel_class(i) == VoxelClass::kFree) REQUIRE(clearing_map.voxel_class(i) == VoxelClass::kFree);
+      dropped += plain_map.voxel_class(i) == VoxelClass::kOccupied && !expected[i] ? 1 : 0;
+      kept += expected[i] ? 1 : 0;
+    }
+  }
+  CHECK(dropped > 1000);
+  CHECK(kept > 100);
+}
+
 TEST_CASE("an absurd depth scale makes no absurd rays", "[mapping][hostile]") {
   OneRay ray;
   Inserter inserter(ray.geometry, ray.sensor);
