@@ -66,7 +66,7 @@ TEST_CASE("a tilted plane is freed of a window's worth of noise, and is not move
     CHECK(replaced > 0.97 * count);
     // 1/7 of the noise, and what stayed as it was; neighbours share most of their windows.
     CHECK(std::sqrt(squared / count) < 0.25);
-    CHECK(std::abs(bias / count) < 0.03);
+    CHECK(std::abs(bias / count) < 0.06);
   }
 }
 
