@@ -1,6 +1,7 @@
 /// The rays of a depth frame: which pixels count, and where each ends in base coordinates.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -88,7 +89,7 @@ class DepthRays {
                        std::span<const float> self_depth_m, Visit visit);
 
   /// The ray of one pixel again; it must have one.
-  [[nodiscard]] RayEnd ray(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth, int u, int v);
+  [[nodiscard]] RayEnd ray(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth, int u, int v) const;
 
   /// The smallest box around the sensor and all ray ends of a frame that passes check().
   [[nodiscard]] AxisBox bounds(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth);
@@ -99,11 +100,13 @@ class DepthRays {
 
   DepthSensor sensor_;
   double range_m_ = 0;
+  float range_squared_m2_ = 0;
   bool per_pixel_ = false;     ///< a distorted image has a direction for each pixel
   std::vector<double> ray_x_;  ///< x / z for each column or pixel; NaN where the lens model has no ray
   std::vector<double> ray_y_;  ///< y / z for each row or pixel
   RayRow row_;
-  std::vector<double> row_y_, row_z_m_, row_distance_m_;
+  std::vector<double> row_y_, row_z_m_;
+  std::vector<float> row_squared_m2_;
 };
 
 template <typename Visit>
@@ -112,7 +115,8 @@ PixelCounts DepthRays::for_each_row(const DepthImage& depth, const Transform<Bas
   std::array<std::uint32_t, 6> counted{};
   for (int v = 0; v < depth.pixels.height; ++v) {
     compute_row(depth, base_T_depth, self_depth_m, v);
-    for (const PixelKind kind : row_.kind) ++counted[static_cast<std::size_t>(kind)];
+    for (std::size_t kind = 0; kind < counted.size(); ++kind)
+      counted[kind] += static_cast<std::uint32_t>(std::count(row_.kind.begin(), row_.kind.end(), PixelKind(kind)));
     visit(v, row_);
   }
   const auto count = [&counted](PixelKind kind) { return counted[static_cast<std::size_t>(kind)]; };
