@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "algorithms/mapping/depth_rays.hpp"
+#include "algorithms/mapping/end_octants.hpp"
 #include "algorithms/mapping/range_image.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 
@@ -61,6 +62,7 @@ class Inserter {
   RayEnds ends_;
   double range_m_ = 0;  ///< where rays are cut: min(range_max_m, range_trusted_m)
   DepthRays rays_;      ///< of voxel centres: not cut, because the centres decide
+  EndOctants end_octants_;
   RangeImage image_;
   std::vector<float> row_reach_m_;
   std::vector<std::int32_t> row_octant_;  ///< 8 * voxel + octant of each end; -1 outside the grid
