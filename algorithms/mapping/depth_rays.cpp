@@ -30,18 +30,8 @@ struct RowArrays {
   float* reach_m;
   PixelKind* kind;
 };
-struct RowFrame {
-  double units_per_m;
-  double rotation[3][3];
-  double translation_m[3];
-  float origin_m[3];
-  double range_m;
-  float range_squared_m2;  // the largest whose root is within the range
-  std::int32_t value_min;  // the first value that is not too near
-};
-
 /// Cuts the rays that are longer than the range.
-[[gnu::always_inline]] inline void cut_ends(const RowArrays& a, const RowFrame& f) {
+[[gnu::always_inline]] inline void cut_ends(const RowArrays& a, const RayFrame& f) {
   const auto cut = static_cast<float>(f.range_m);
   for (int axis = 0; axis < 3; ++axis) {
     const float origin = f.origin_m[axis];
@@ -60,7 +50,7 @@ struct RowFrame {
 
 /// Ends of the rays, with or without a return; `end_m` is where the ray is cut when it is longer than the range. Kinds
 /// but for the arm's own body and missing rays.
-[[gnu::always_inline]] inline void compute_ends(const RowArrays& a, const RowFrame& f) {
+[[gnu::always_inline]] inline void compute_ends(const RowArrays& a, const RayFrame& f) {
   for (int c = 0; c < a.width; ++c) a.z_m[c] = static_cast<double>(a.value[c]) / f.units_per_m;
   float* __restrict end_x = a.end_m[0];
   float* __restrict end_y = a.end_m[1];
@@ -92,8 +82,8 @@ struct RowFrame {
   if (longer != 0) cut_ends(a, f);
 }
 // The same instructions in the same order, several pixels at a time where the processor can: the same bits.
-FIRSTLOOK_AVX2 void compute_ends_avx2(const RowArrays& a, const RowFrame& f) { compute_ends(a, f); }
-void compute_ends_portable(const RowArrays& a, const RowFrame& f) { compute_ends(a, f); }
+FIRSTLOOK_AVX2 void compute_ends_avx2(const RowArrays& a, const RayFrame& f) { compute_ends(a, f); }
+void compute_ends_portable(const RowArrays& a, const RayFrame& f) { compute_ends(a, f); }
 
 /// The largest float whose root does not exceed the range: one comparison instead of a root for each pixel.
 float range_squared(double range_m) {
@@ -111,22 +101,6 @@ std::int32_t first_value(double range_min_m, double units_per_m) {
   while (value > 0 && (value - 1) / units_per_m >= range_min_m) --value;
   while (value < kValues && value / units_per_m < range_min_m) ++value;
   return value;
-}
-
-RowFrame frame_of(const DepthRays& rays, float range_squared_m2, double units_per_m,
-                  const Transform<Base, Depth>& base_T_depth) {
-  RowFrame frame{};
-  frame.units_per_m = units_per_m;
-  frame.range_m = rays.range_m();
-  frame.range_squared_m2 = range_squared_m2;
-  frame.value_min = first_value(rays.sensor().range_min_m, units_per_m);
-  const Eigen::Matrix3d rotation = base_T_depth.rotation();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) frame.rotation[i][j] = rotation(i, j);
-    frame.translation_m[i] = base_T_depth.translation()[i];
-    frame.origin_m[i] = static_cast<float>(frame.translation_m[i]);
-  }
-  return frame;
 }
 
 }  // namespace
@@ -165,6 +139,15 @@ DepthRays::DepthRays(const DepthSensor& sensor)
   }
 }
 
+PixelCounts counts_of(const std::array<std::uint32_t, kPixelKinds>& pixels) {
+  const auto count = [&pixels](PixelKind kind) { return pixels[static_cast<std::size_t>(kind)]; };
+  return {.pixels_used = count(PixelKind::kHit),
+          .pixels_beyond = count(PixelKind::kBeyond) + count(PixelKind::kNoDirection),
+          .pixels_empty = count(PixelKind::kEmpty),
+          .pixels_too_near = count(PixelKind::kTooNear),
+          .pixels_self = count(PixelKind::kSelf)};
+}
+
 std::size_t DepthRays::required_bytes(const DepthSensor& sensor) {
   const auto width = static_cast<std::size_t>(sensor.intrinsics.width);
   const auto height = static_cast<std::size_t>(sensor.intrinsics.height);
@@ -197,7 +180,22 @@ AxisBox DepthRays::bounds(const DepthImage& depth, const Transform<Base, Depth>&
   return {low_m.cast<double>(), high_m.cast<double>()};
 }
 
-RayEnd DepthRays::ray(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth, int u, int v) const {
+RayFrame DepthRays::frame(double units_per_m, const Transform<Base, Depth>& base_T_depth) const {
+  RayFrame frame{};
+  frame.units_per_m = units_per_m;
+  frame.range_m = range_m_;
+  frame.range_squared_m2 = range_squared_m2_;
+  frame.value_min = first_value(sensor_.range_min_m, units_per_m);
+  const Eigen::Matrix3d rotation = base_T_depth.rotation();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) frame.rotation[i][j] = rotation(i, j);
+    frame.translation_m[i] = base_T_depth.translation()[i];
+    frame.origin_m[i] = static_cast<float>(frame.translation_m[i]);
+  }
+  return frame;
+}
+
+RayEnd DepthRays::ray(const RayFrame& frame, const DepthImage& depth, int u, int v) const {
   const auto row = static_cast<std::size_t>(v), column = static_cast<std::size_t>(u);
   const std::size_t pixel = row * static_cast<std::size_t>(depth.pixels.width) + column;
   double z_m = 0;
@@ -213,17 +211,16 @@ RayEnd DepthRays::ray(const DepthImage& depth, const Transform<Base, Depth>& bas
                       .end_m = {&ray.end_m.x(), &ray.end_m.y(), &ray.end_m.z()},
                       .reach_m = &ray.reach_m,
                       .kind = &kind};
-  compute_ends_portable(one, frame_of(*this, range_squared_m2_, depth.units_per_m, base_T_depth));
+  compute_ends(one, frame);
   ray.is_hit = kind == PixelKind::kHit;
   return ray;
 }
 
-void DepthRays::compute_row(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
-                            std::span<const float> self_depth_m, int v) {
+void DepthRays::compute_row(const RayFrame& frame, const DepthImage& depth, std::span<const float> self_depth_m,
+                            int v) {
   const auto width = static_cast<std::size_t>(depth.pixels.width);
   const std::size_t first = static_cast<std::size_t>(v) * width;
   if (!per_pixel_) std::fill(row_y_.begin(), row_y_.end(), ray_y_[static_cast<std::size_t>(v)]);
-  const RowFrame frame = frame_of(*this, range_squared_m2_, depth.units_per_m, base_T_depth);
   const RowArrays arrays{.width = depth.pixels.width,
                          .value = depth.pixels.data + first,
                          .x = ray_x_.data() + (per_pixel_ ? first : 0),

@@ -87,6 +87,7 @@ Inserter::Inserter(const GridGeometry& geometry, const DepthSensor& sensor, RayE
       ends_(ends),
       range_m_(std::min(sensor.range_max_m, sensor.range_trusted_m)),
       rays_(ends == RayEnds::kPixels ? sensor : without_range(sensor, geometry.resolution_m)),
+      end_octants_(geometry, sensor),
       image_(sensor.intrinsics.width, sensor.intrinsics.height) {
   ENSURE(3021, geometry.resolution_m >= kResolutionMin_m && (geometry.size.array() > 0).all());
   ENSURE(3025, geometry.count() <= std::numeric_limits<std::int32_t>::max() / 8);
@@ -101,6 +102,7 @@ Inserter::Inserter(const GridGeometry& geometry, const DepthSensor& sensor, RayE
 std::size_t Inserter::required_bytes(const GridGeometry& geometry, const DepthSensor& sensor, RayEnds ends) {
   const std::size_t planes = ends == RayEnds::kPixels ? 2 : 3;
   return planes * VoxelMap::bit_words(geometry) * sizeof(std::uint64_t) + DepthRays::required_bytes(sensor) +
+         EndOctants::required_bytes(sensor) +
          RangeImage::required_bytes(sensor.intrinsics.width, sensor.intrinsics.height) +
          static_cast<std::size_t>(sensor.intrinsics.width) * (sizeof(float) + sizeof(std::int32_t));
 }
@@ -124,7 +126,7 @@ Result<InsertionResult> Inserter::insert(VoxelMap& map, const DepthImage& depth,
   InsertionResult result;
   if (ends_ == RayEnds::kVoxelCenters)
     mark_discretized(map, depth, base_T_depth, self_depth_m, result);
-  else if (rays_.is_pinhole())
+  else if (rays_.is_pinhole() && depth.units_per_m >= EndOctants::kUnitsPerMeterMin)
     mark_by_voxels(map, depth, base_T_depth, self_depth_m, result);
   else
     mark_by_rays(map, depth, base_T_depth, self_depth_m, result);
@@ -179,7 +181,9 @@ void Inserter::mark_by_rays(VoxelMap& map, const DepthImage& depth, const Transf
 void Inserter::mark_by_voxels(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                               std::span<const float> self_depth_m, PixelCounts& counts) {
   counts =
-      rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) { note_row(map, v, row); });
+      end_octants_.find(rays_, depth, base_T_depth, self_depth_m, image_, [&](std::span<const std::int32_t> octants) {
+        for (const std::int32_t octant : octants) mark_hit(map, octant);
+      });
   image_.build_levels();
   mark_passed_voxels(geometry_, rays_, image_, depth, base_T_depth, hit_, missed_);
 }

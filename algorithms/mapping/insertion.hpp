@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algorithms/mapping/depth_rays.hpp"
+#include "algorithms/mapping/end_octants.hpp"
 #include "algorithms/mapping/range_image.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 
@@ -76,6 +77,7 @@ class Inserter {
   RayEnds ends_;
   double range_m_ = 0;  ///< where rays are cut: min(range_max_m, range_trusted_m)
   DepthRays rays_;      ///< of voxel centres: not cut, because the centres decide
+  EndOctants end_octants_;
   RangeImage image_;
   std::optional<GroundPlane> ground_;
   std::vector<float> row_reach_m_;

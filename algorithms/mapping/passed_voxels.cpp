@@ -17,8 +17,9 @@ using namespace lanes;  // boxes of a row, pixels of a row
 
 const Eigen::Vector3i kBrick(kLanes, 4, 4);
 constexpr float kNear_m = 1e-3F;  // boxes that come nearer than this to the camera's plane have no footprint
-constexpr int kBlockLevel = 3;    // cells of 8 x 8 pixels
-constexpr int kNarrow_px = 24;    // footprints up to this width are searched row by row, others cell by cell
+constexpr int kSmall_px = 8;      // footprints up to this width are searched row by row, others cell by cell:
+constexpr int kFineLevel = 2;     // cells of 4 x 4 pixels
+constexpr int kCoarseLevel = 3;   // and of 8 x 8 for those that are wider than eight fine ones
 
 /// The exponents of positive numbers: floor(log2(x)).
 [[gnu::always_inline]] inline void exponents(const Floats& x, Ints& out) {
@@ -53,7 +54,7 @@ struct BoxRow {
   float rounding_m;
   float footprint_px_m, slack_px;
   float ball_px_m;  // voxels: times 1 / depth: how far beside a middle, in pixels along both axes, a ray still meets it
-  float whole_far_m;  // bricks: up to this depth every voxel is met by the ray of the pixel at its middle
+  float whole_far_m;  // bricks: up to this depth every voxel is met by all rays of the 2 x 2 pixels at its middle
   std::int32_t level_max;
   Levels cell_farthest, around_farthest, around_nearest;
 };
@@ -221,6 +222,43 @@ RayAnswer ask_rays_portable(const RayTest& t) { return ask_rays(t); }
 FIRSTLOOK_AVX2 unsigned ask_cells_avx2(const RayTest& t) { return ask_cells(t); }
 unsigned ask_cells_portable(const RayTest& t) { return ask_cells(t); }
 
+/// A voxel's silhouette: rays pass it where each of six linear functions of the pixel, distances times depth beside its
+/// edges, is not positive (Pineda 1988).
+struct Silhouette {
+  static constexpr std::size_t kEdges = 6;
+  float at[kEdges], per_u[kEdges], per_v[kEdges];
+};
+/// Cells of the image against a silhouette: eight columns, up to eight rows.
+struct CellTest {
+  Silhouette edges;      // in cells from the first one on, widened by half a cell and rounding
+  float enters_m;        // nearest depth of the voxel's box
+  const float* reach_m;  // of the first row
+  std::int32_t stride;
+  int rows;
+};
+/// The cells where a ray could pass the voxel, eight bits for each row.
+[[gnu::always_inline]] inline std::uint64_t ask_silhouette(const CellTest& t) {
+  const Silhouette& s = t.edges;
+  Floats column[Silhouette::kEdges];
+  for (std::size_t edge = 0; edge < Silhouette::kEdges; ++edge) column[edge] = s.at[edge] + kCounting * s.per_u[edge];
+  std::uint64_t open = 0;
+  for (int row = 0; row < t.rows; ++row) {
+    Floats reach;
+    std::memcpy(&reach, t.reach_m + row * t.stride, sizeof(reach));
+    const Ints reaches = (reach > t.enters_m) & (reach > 0.0F);
+    if (!any(reaches)) continue;
+    Floats beside = column[0] + static_cast<float>(row) * s.per_v[0];
+    for (std::size_t edge = 1; edge < Silhouette::kEdges; ++edge) {
+      const Floats other = column[edge] + static_cast<float>(row) * s.per_v[edge];
+      beside = other > beside ? other : beside;
+    }
+    open |= static_cast<std::uint64_t>(bits_of(reaches & (beside <= 0.0F))) << (row * kLanes);
+  }
+  return open;
+}
+FIRSTLOOK_AVX2 std::uint64_t ask_silhouette_avx2(const CellTest& t) { return ask_silhouette(t); }
+std::uint64_t ask_silhouette_portable(const CellTest& t) { return ask_silhouette(t); }
+
 /// Eight bits of a plane from `index` on; bits beyond the plane read as 0.
 unsigned read_bits(std::span<const std::uint64_t> plane, std::size_t index) {
   const std::size_t word = index >> 6, shift = index & 63;
@@ -246,25 +284,29 @@ struct PixelRect {
 /// One frame, held against the voxels of a grid.
 class Frame {
  public:
-  Frame(const GridGeometry& geometry, DepthRays& rays, const RangeImage& image, const DepthImage& depth,
+  Frame(const GridGeometry& geometry, const DepthRays& rays, const RangeImage& image, const DepthImage& depth,
         const Transform<Base, Depth>& base_T_depth, std::span<const std::uint64_t> hits,
         std::span<std::uint64_t> plane);
   void mark();
 
  private:
   void prepare(BoxRow& row, const Eigen::Vector3i& box, float slack_px) const;
-  void place(BoxRow& row, const Eigen::Vector3i& low, const Eigen::Vector3i& box) const;
+  static void place(BoxRow& row, const Eigen::Vector3d& center_m);
   [[nodiscard]] Eigen::Vector3d in_camera(const Eigen::Vector3d& voxel) const;
   [[nodiscard]] PixelRect footprint(const Eigen::Vector3f& center_m) const;
   void mark_brick(const Eigen::Vector3i& low, bool all);
   void mark_row(const Eigen::Vector3i& low);
-  [[nodiscard]] bool is_passed(const Eigen::Vector3i& voxel);
+  [[nodiscard]] bool is_passed(const Eigen::Vector3i& row, int lane);
+  [[nodiscard]] bool is_passed_in_footprint(const PixelRect& rect);
   [[nodiscard]] bool is_passed_in_columns(int u, int v_low, int v_high);
+  [[nodiscard]] bool find_silhouette(const PixelRect& rect, Silhouette& silhouette) const;
+  [[nodiscard]] bool is_passed_in_silhouette(const PixelRect& rect, const Silhouette& silhouette);
   [[nodiscard]] bool is_passed_in_cells(const PixelRect& rect);
   [[nodiscard]] bool is_walked(const Pixel& pixel) const;
 
   const GridGeometry& geometry_;
-  DepthRays& rays_;
+  const DepthRays& rays_;
+  RayFrame ray_frame_;
   const RangeImage& image_;
   const DepthImage& depth_;
   const Transform<Base, Depth>& base_T_depth_;
@@ -282,14 +324,17 @@ class Frame {
   // The voxel that is being held against rays.
   Eigen::Vector3i voxel_;
   RayTest test_{};
+  float along_[3][3];  // direction of the ray of pixel (0, 0), base axes, and its change from column to column and row
+                       // to row
   FixedVector<Pixel, 256> perhaps_;  // rays that rounding could decide: walked when no other one passes
 };
 
-Frame::Frame(const GridGeometry& geometry, DepthRays& rays, const RangeImage& image, const DepthImage& depth,
+Frame::Frame(const GridGeometry& geometry, const DepthRays& rays, const RangeImage& image, const DepthImage& depth,
              const Transform<Base, Depth>& base_T_depth, std::span<const std::uint64_t> hits,
              std::span<std::uint64_t> plane)
     : geometry_(geometry),
       rays_(rays),
+      ray_frame_(rays.frame(depth.units_per_m, base_T_depth)),
       image_(image),
       depth_(depth),
       base_T_depth_(base_T_depth),
@@ -317,6 +362,13 @@ Frame::Frame(const GridGeometry& geometry, DepthRays& rays, const RangeImage& im
   t.cy = static_cast<float>(camera_.cy);
   t.rounding_m = static_cast<float>(rounding_m_);
   t.half_m = static_cast<float>(half_m_);
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d axis = depth_R_base_.col(i);
+    along_[i][0] =
+        static_cast<float>(axis.z() - axis.x() * camera_.cx / camera_.fx - axis.y() * camera_.cy / camera_.fy);
+    along_[i][1] = static_cast<float>(axis.x() / camera_.fx);
+    along_[i][2] = static_cast<float>(axis.y() / camera_.fy);
+  }
   t.step_px = 1;
   t.stride = image.cell_farthest().stride();
 }
@@ -350,15 +402,14 @@ void Frame::prepare(BoxRow& b, const Eigen::Vector3i& box, float slack_px) const
   b.slack_px = slack_px;
   // Within its inscribed ball a ray meets a voxel for certain; half a pixel is off already where the middle lies.
   b.ball_px_m = static_cast<float>((half_m_ - 2 * rounding_m_) / (1.002 * pixel_diagonal_));
-  b.whole_far_m = b.ball_px_m / 0.5F;
+  b.whole_far_m = b.ball_px_m / 1.5F;
   b.level_max = image_.level_max();
   b.cell_farthest = levels_of(image_.cell_farthest());
   b.around_farthest = levels_of(image_.around_farthest());
   b.around_nearest = levels_of(image_.around_nearest());
 }
 
-void Frame::place(BoxRow& b, const Eigen::Vector3i& low, const Eigen::Vector3i& box) const {
-  const Eigen::Vector3d center_m = in_camera(low.cast<double>() + box.cast<double>() / 2);
+void Frame::place(BoxRow& b, const Eigen::Vector3d& center_m) {
   for (int i = 0; i < 3; ++i) b.center_m[i] = static_cast<float>(center_m[i]);
 }
 
@@ -413,7 +464,7 @@ void Frame::mark() {
     for (int y = first.y(); y <= last.y(); ++y) {
       for (int x = first.x(); x <= last.x(); x += kLanes) {
         const Eigen::Vector3i low = kBrick.cwiseProduct(Eigen::Vector3i(x, y, z));
-        place(bricks_, low, kBrick);
+        place(bricks_, in_camera(low.cast<double>() + kBrick.cast<double>() / 2));
         const BoxAnswers answers = has_avx2() ? ask_bricks_avx2(bricks_) : ask_bricks_portable(bricks_);
         const unsigned lanes = (1U << std::min(kLanes, last.x() - x + 1)) - 1;
         for (unsigned open = lanes & ~answers.rejected; open != 0; open &= open - 1) {
@@ -427,55 +478,130 @@ void Frame::mark() {
 
 void Frame::mark_brick(const Eigen::Vector3i& low, bool all) {
   const Eigen::Vector3i high = (low + kBrick).cwiseMin(geometry_.size);
+  const Eigen::Vector3d first_m = in_camera(low.cast<double>() + Eigen::Vector3d::Constant(0.5));
+  const Eigen::Vector3d step_y_m = depth_R_base_.col(1) * geometry_.resolution_m;
+  const Eigen::Vector3d step_z_m = depth_R_base_.col(2) * geometry_.resolution_m;
   for (int z = low.z(); z < high.z(); ++z) {
     for (int y = low.y(); y < high.y(); ++y) {
       const Eigen::Vector3i row(low.x(), y, z);
-      if (all)
+      if (all) {
         set_bits(plane_, geometry_.index(row), (1U << (high.x() - low.x())) - 1);
-      else
+      } else {
+        place(voxels_, first_m + (y - low.y()) * step_y_m + (z - low.z()) * step_z_m);
         mark_row(row);
+      }
     }
   }
 }
 
+/// voxels_ are in place.
 void Frame::mark_row(const Eigen::Vector3i& low) {
   const std::size_t index = geometry_.index(low);
   const unsigned lanes = (1U << std::min(kLanes, geometry_.size.x() - low.x())) - 1;
-  place(voxels_, low, Eigen::Vector3i::Ones());
   const BoxAnswers answers = has_avx2() ? ask_voxels_avx2(voxels_) : ask_voxels_portable(voxels_);
   unsigned passed = answers.passed & ~answers.rejected & lanes;
   for (unsigned open = lanes & ~answers.rejected & ~passed & ~read_bits(hits_, index); open != 0; open &= open - 1) {
     const int lane = std::countr_zero(open);
-    if (is_passed({low.x() + lane, low.y(), low.z()})) passed |= 1U << lane;
+    if (is_passed(low, lane)) passed |= 1U << lane;
   }
   if (passed != 0) set_bits(plane_, index, passed);
 }
 
-bool Frame::is_passed(const Eigen::Vector3i& voxel) {
-  const Eigen::Vector3d middle = voxel.cast<double>().array() + 0.5;
-  const Eigen::Vector3d to_center_m = (geometry_.first.cast<double>() + middle) * geometry_.resolution_m - origin_m_;
-  const Eigen::Vector3f center_m = (depth_R_base_ * to_center_m).cast<float>();
+/// A voxel of the row that is in place.
+bool Frame::is_passed(const Eigen::Vector3i& row, int lane) {
+  voxel_ = row + Eigen::Vector3i(lane, 0, 0);
+  Eigen::Vector3f center_m;
+  for (int i = 0; i < 3; ++i) {
+    center_m[i] = voxels_.center_m[i] + static_cast<float>(lane) * voxels_.step_m[i];
+    test_.to_center_m[i] =
+        static_cast<float>((geometry_.first[i] + voxel_[i] + 0.5) * geometry_.resolution_m - origin_m_[i]);
+  }
   const float near_m = center_m.z() - voxels_.half_m[2], far_m = center_m.z() + voxels_.half_m[2];
-  for (int i = 0; i < 3; ++i) test_.to_center_m[i] = static_cast<float>(to_center_m[i]);
   test_.enters_m = near_m - 2 * voxels_.rounding_m;
   test_.leaves_m = far_m + 2 * voxels_.rounding_m;
-  voxel_ = voxel;
   perhaps_.clear();
   PixelRect rect{0, 0, camera_.width - 1, camera_.height - 1};
   if (near_m > kNear_m) rect = footprint(center_m);
   if (rect.empty()) return false;
-  if (rect.u_high - rect.u_low >= kNarrow_px) {
-    if (is_passed_in_cells(rect)) return true;
-  } else {
-    for (int u = rect.u_low; u <= rect.u_high; u += kLanes) {
-      if (is_passed_in_columns(u, rect.v_low, rect.v_high)) return true;
-    }
-  }
+  if (is_passed_in_footprint(rect)) return true;
   return std::any_of(perhaps_.begin(), perhaps_.end(), [&](const Pixel& pixel) { return is_walked(pixel); });
 }
 
+bool Frame::is_passed_in_footprint(const PixelRect& rect) {
+  if (rect.u_high - rect.u_low >= kSmall_px) {
+    Silhouette silhouette;
+    return find_silhouette(rect, silhouette) ? is_passed_in_silhouette(rect, silhouette) : is_passed_in_cells(rect);
+  }
+  return is_passed_in_columns(rect.u_low, rect.v_low, rect.v_high);
+}
+
+/// @return false where rays of the footprint go both ways along an axis: the silhouette's edges differ then
+bool Frame::find_silhouette(const PixelRect& rect, Silhouette& silhouette) const {
+  float sign[3];
+  for (int i = 0; i < 3; ++i) {
+    const auto [first, per_u, per_v] = along_[i];
+    const float corner = first + static_cast<float>(rect.u_low) * per_u + static_cast<float>(rect.v_low) * per_v;
+    const float across = static_cast<float>(rect.u_high - rect.u_low) * per_u;
+    const float down = static_cast<float>(rect.v_high - rect.v_low) * per_v;
+    const float low = corner + std::min(across, 0.0F) + std::min(down, 0.0F);
+    const float high = corner + std::max(across, 0.0F) + std::max(down, 0.0F);
+    if (low < 0 && high > 0) return false;
+    sign[i] = low < 0 ? -1 : 1;
+  }
+  float* const terms[3] = {silhouette.at, silhouette.per_u, silhouette.per_v};
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    for (int term = 0; term < 3; ++term) {
+      const float beside = test_.to_center_m[j] * along_[k][term] - test_.to_center_m[k] * along_[j][term];
+      const float half = test_.half_m * (sign[j] * along_[j][term] + sign[k] * along_[k][term]);
+      terms[term][2 * i] = beside - half;
+      terms[term][2 * i + 1] = -beside - half;
+    }
+  }
+  return true;
+}
+
+bool Frame::is_passed_in_silhouette(const PixelRect& rect, const Silhouette& silhouette) {
+  const int level = rect.u_high - rect.u_low < (kLanes - 1) << kFineLevel ? kFineLevel : kCoarseLevel;
+  const int x_low = rect.u_low >> level, x_high = rect.u_high >> level;
+  const int y_low = rect.v_low >> level, y_high = rect.v_high >> level;
+  const auto cell_px = static_cast<float>(1 << level);
+  const float to_middle_px = (cell_px - 1) / 2;
+  CellTest cells;
+  cells.enters_m = test_.enters_m;
+  cells.stride = test_.stride;
+  for (std::size_t edge = 0; edge < Silhouette::kEdges; ++edge) {
+    cells.edges.per_u[edge] = silhouette.per_u[edge] * cell_px;
+    cells.edges.per_v[edge] = silhouette.per_v[edge] * cell_px;
+  }
+  for (int y = y_low; y <= y_high; y += kLanes) {
+    cells.rows = std::min(kLanes, y_high - y + 1);
+    for (int x = x_low; x <= x_high; x += kLanes) {
+      const float u = static_cast<float>(x) * cell_px + to_middle_px,
+                  v = static_cast<float>(y) * cell_px + to_middle_px;
+      for (std::size_t edge = 0; edge < Silhouette::kEdges; ++edge) {
+        const float per_u = silhouette.per_u[edge], per_v = silhouette.per_v[edge];
+        const float spread = to_middle_px * (std::abs(per_u) + std::abs(per_v));
+        cells.edges.at[edge] = silhouette.at[edge] + u * per_u + v * per_v - spread - 2 * test_.rounding_m;
+      }
+      cells.reach_m = image_.cell_farthest().row(level, y) + x;
+      std::uint64_t open = has_avx2() ? ask_silhouette_avx2(cells) : ask_silhouette_portable(cells);
+      const int columns = std::min(kLanes, x_high - x + 1);
+      while (open != 0) {
+        const int cell = std::countr_zero(open), column = cell % kLanes, row = y + cell / kLanes;
+        // A look at eight columns is one at two fine cells.
+        open &= ~((level == kFineLevel && column + 1 < kLanes ? 3ULL : 1ULL) << cell);
+        if (column >= columns) continue;
+        const int v_low = std::max(rect.v_low, row << level), v_high = std::min(rect.v_high, ((row + 1) << level) - 1);
+        if (is_passed_in_columns((x + column) << level, v_low, v_high)) return true;
+      }
+    }
+  }
+  return false;
+}
+
 bool Frame::is_passed_in_cells(const PixelRect& rect) {
-  constexpr int kCell = 1 << kBlockLevel;
+  constexpr int kCell = 1 << kCoarseLevel;
   constexpr float kToMiddle_px = (kCell - 1) / 2.0F;
   // As far as a cell's other rays are from its middle's within the voxel.
   const float spread_m = kToMiddle_px * static_cast<float>(pixel_diagonal_) * std::max(0.0F, test_.leaves_m);
@@ -488,7 +614,7 @@ bool Frame::is_passed_in_cells(const PixelRect& rect) {
     cells.v = static_cast<float>(y * kCell) + kToMiddle_px;
     for (int x = rect.u_low / kCell; x <= rect.u_high / kCell; x += kLanes) {
       cells.u = static_cast<float>(x * kCell) + kToMiddle_px;
-      cells.reach_m = image_.cell_farthest().row(kBlockLevel, y) + x;
+      cells.reach_m = image_.cell_farthest().row(kCoarseLevel, y) + x;
       for (unsigned open = has_avx2() ? ask_cells_avx2(cells) : ask_cells_portable(cells); open != 0;
            open &= open - 1) {
         if (is_passed_in_columns((x + std::countr_zero(open)) * kCell, v_low, v_high)) return true;
@@ -522,14 +648,14 @@ bool Frame::is_passed_in_columns(int u, int v_low, int v_high) {
 }
 
 bool Frame::is_walked(const Pixel& pixel) const {
-  return marker_.passes(rays_.ray(depth_, base_T_depth_, pixel.u, pixel.v).end_m, voxel_);
+  return marker_.passes(rays_.ray(ray_frame_, depth_, pixel.u, pixel.v).end_m, voxel_);
 }
 
 }  // namespace
 
-void mark_passed_voxels(const GridGeometry& geometry, DepthRays& rays, const RangeImage& image, const DepthImage& depth,
-                        const Transform<Base, Depth>& base_T_depth, std::span<const std::uint64_t> hits,
-                        std::span<std::uint64_t> plane) {
+void mark_passed_voxels(const GridGeometry& geometry, const DepthRays& rays, const RangeImage& image,
+                        const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                        std::span<const std::uint64_t> hits, std::span<std::uint64_t> plane) {
   Frame(geometry, rays, image, depth, base_T_depth, hits, plane).mark();
 }
 

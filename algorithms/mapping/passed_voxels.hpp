@@ -18,8 +18,8 @@ namespace firstlook {
 /// @param image  the frame's reach, of every row
 /// @param hits   voxels that hold a hit: not asked about, their mark means nothing
 /// @param plane  VoxelMap::bit_words words; gets the marks
-void mark_passed_voxels(const GridGeometry& geometry, DepthRays& rays, const RangeImage& image, const DepthImage& depth,
-                        const Transform<Base, Depth>& base_T_depth, std::span<const std::uint64_t> hits,
-                        std::span<std::uint64_t> plane);
+void mark_passed_voxels(const GridGeometry& geometry, const DepthRays& rays, const RangeImage& image,
+                        const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                        std::span<const std::uint64_t> hits, std::span<std::uint64_t> plane);
 
 }  // namespace firstlook

@@ -46,6 +46,8 @@ template <typename Better>
 constexpr auto kFarther = [](float a, float b) { return a > b ? a : b; };
 constexpr auto kNearer = [](float a, float b) { return a < b ? a : b; };
 
+FIRSTLOOK_AVX2 void farthest_avx2(const Rows& far, float* out, int count) { join_cells(far, out, count, kFarther); }
+void farthest_portable(const Rows& far, float* out, int count) { join_cells(far, out, count, kFarther); }
 FIRSTLOOK_AVX2 void cells_avx2(const Rows& far, const Rows& near, float* far_out, float* near_out, int count) {
   join_cells(far, far_out, count, kFarther);
   join_cells(near, near_out, count, kNearer);
@@ -101,13 +103,17 @@ void RangeImage::set_row(int v, std::span<const float> reach_m) {
 void RangeImage::build_levels() {
   for (int level = 1; level <= level_max_; ++level) {
     const int columns = cells(width_, level), rows = cells(height_, level), rows_under = cells(height_, level - 1);
-    const Pyramid& nearest_under = level == 1 ? farthest_ : nearest_;
     for (int y = 0; y < rows; ++y) {
       const bool both = 2 * y + 1 < rows_under;
       const Rows far{farthest_.row(level - 1, 2 * y), nullptr,
                      both ? farthest_.row(level - 1, 2 * y + 1) : nothing_.data()};
-      const Rows near{nearest_under.row(level - 1, 2 * y), nullptr,
-                      both ? nearest_under.row(level - 1, 2 * y + 1) : nothing_.data()};
+      if (level == 1) {
+        (has_avx2() ? farthest_avx2 : farthest_portable)(far, farthest_.row(1, y), columns);
+        std::copy_n(farthest_.row(1, y), columns, nearest_.row(1, y));
+        continue;
+      }
+      const Rows near{nearest_.row(level - 1, 2 * y), nullptr,
+                      both ? nearest_.row(level - 1, 2 * y + 1) : nothing_.data()};
       (has_avx2() ? cells_avx2 : cells_portable)(far, near, farthest_.row(level, y), nearest_.row(level, y), columns);
     }
     for (int y = 0; y < rows; ++y) {

@@ -42,7 +42,9 @@ class RangeImage {
   RangeImage(int width, int height);
   [[nodiscard]] static std::size_t required_bytes(int width, int height);
 
-  /// A row of pixels; kNoRay for those without a ray. After the last one of a frame: build_levels().
+  /// A row of pixels to be filled, kNoRay for those without a ray; up to eight of these may follow it. After the last
+  /// row of a frame: build_levels().
+  [[nodiscard]] float* row(int v) { return farthest_.row(0, v); }
   void set_row(int v, std::span<const float> reach_m);
   void build_levels();
 
@@ -53,8 +55,8 @@ class RangeImage {
   [[nodiscard]] float farthest() const { return farthest_.at(level_max_, 0, 0); }
   /// Of each cell, from level 0 on.
   [[nodiscard]] const Pyramid& cell_farthest() const { return farthest_; }
-  /// Of each cell and the eight around it, from level 1 on: of all that lies within 2^level pixels of any of its
-  /// pixels.
+  /// Of each cell and the eight around it, from level 1 on. The nearest is that of cells of 2 x 2 pixels, each of which
+  /// reaches as far as its farthest pixel does: single pixels without a return hide nothing.
   [[nodiscard]] const Pyramid& around_farthest() const { return around_farthest_; }
   [[nodiscard]] const Pyramid& around_nearest() const { return around_nearest_; }
 

@@ -107,13 +107,11 @@ struct View {
   /// A ray has come to a voxel. @return false where it ends
   bool meet(std::size_t index, bool far_enough) {
     const std::uint8_t what = plane.what()[index];
-    if (what == 0) return true;
-    if (what == kOpaque) return false;
-    if (what != kUnknownNoWeight && far_enough && scratch.mark(index)) {
-      ++count.voxels;
-      count.weight += what;
-    }
-    return plane.reading() == UnknownReading::kSeeThrough;
+    const bool has_weight = what >= 1 && what <= kGainWeightMax;
+    const bool is_new = scratch.mark(index, has_weight && far_enough);
+    count.voxels += is_new ? 1 : 0;
+    count.weight += is_new ? what : 0;
+    return what == 0 || (what != kOpaque && plane.reading() == UnknownReading::kSeeThrough);
   }
   void walk_to(const Eigen::Vector3d& end_m) {
     ray.direction = rotation * end_m;
@@ -131,19 +129,16 @@ struct Eye {
   std::int32_t voxel[3];  // inside the grid
   std::int32_t after[3];  // voxels between it and the grid's upper faces
   std::int32_t stride[3];
-  std::int32_t index;
+  std::int32_t index, count;
   const std::uint8_t* room;
   float rounding;  // floats may be off by this
   float range_min_m;
-};
-struct Packet {
-  Floats end_m[3];  // sensor axes
-  unsigned lanes;   // that hold a ray
+  bool is_stopped;  // a ray ends where it first has something to do
 };
 /// Rays that have come to a voxel where there is something to do, and those that must be walked instead.
 struct Arrivals {
   unsigned at = 0, near = 0, walked = 0;  // near: nearer than the minimum range
-  Ints index;
+  std::int32_t index[kLanes];
 };
 
 /// Eight rays on their way. Each counts voxels in its own direction, so that all go upwards.
@@ -151,89 +146,107 @@ struct Way {
   Floats size[3], per[3];  // of the direction of length one, and its inverse
   Floats from[3];          // where in its voxel the ray starts
   Floats at[3];            // voxels gone along each axis
-  Ints left[3], stride[3];
+  Floats left[3];
+  Ints stride[3];
+  Ints octant;          // where its room begins
   Floats end, nearest;  // lengths: of the ray, and to the minimum range
-  Ints active, unsure;  // unsure: rounding could mean the neighbour
+  Ints active, unsure;  // unsure: rounding could mean the next voxel instead
 };
 
-[[gnu::always_inline]] inline void start(const Eye& eye, const Packet& packet, Way& way) {
-  Floats direction[3], squared{};
+/// @param ends_m  of eight rays, sensor axes
+[[gnu::always_inline]] inline void start(const Eye& eye, const Eigen::Vector3d* ends_m, unsigned lanes, Way& way) {
+  Floats end_m[3], direction[3], squared{};
+  load_points(ends_m->data(), end_m);
   for (int i = 0; i < 3; ++i) {
-    direction[i] = eye.rotation[i][0] * packet.end_m[0] + eye.rotation[i][1] * packet.end_m[1] +
-                   eye.rotation[i][2] * packet.end_m[2];
+    direction[i] = eye.rotation[i][0] * end_m[0] + eye.rotation[i][1] * end_m[1] + eye.rotation[i][2] * end_m[2];
     squared += direction[i] * direction[i];
   }
   for (int i = 0; i < kLanes; ++i) way.end[i] = std::sqrt(squared[i]);
   const Floats per_length = 1.0F / way.end;
+  Ints octant{};
   for (int i = 0; i < 3; ++i) {
     const Ints backwards = direction[i] < 0.0F;
     const Floats size = (backwards ? -direction[i] : direction[i]) * per_length;
     way.size[i] = size > 1e-12F ? size : Floats{} + 1e-12F;
     way.per[i] = 1.0F / way.size[i];
     way.from[i] = backwards ? Floats{} + (1.0F - eye.in_voxel[i]) : Floats{} + eye.in_voxel[i];
-    way.left[i] = backwards ? Ints{} + eye.voxel[i] : Ints{} + eye.after[i];
+    way.left[i] = __builtin_convertvector(backwards ? Ints{} + eye.voxel[i] : Ints{} + eye.after[i], Floats);
     way.stride[i] = backwards ? Ints{} - eye.stride[i] : Ints{} + eye.stride[i];
     way.at[i] = Floats{};
+    octant |= backwards & (1 << i);
   }
-  way.nearest = eye.range_min_m / packet.end_m[2] * way.end;
-  for (int i = 0; i < kLanes; ++i) way.active[i] = -static_cast<std::int32_t>(packet.lanes >> i & 1);
+  way.octant = octant * eye.count;
+  way.nearest = eye.range_min_m / end_m[2] * way.end;
+  constexpr Ints kBits = {1, 2, 4, 8, 16, 32, 64, 128};
+  way.active = ((Ints{} + static_cast<std::int32_t>(lanes)) & kBits) != 0;
   way.unsure = Ints{};
 }
 
 /// From one room to the next. @return false when no ray is left
 [[gnu::always_inline]] inline bool advance(const Eye& eye, Way& way, Arrivals& arrivals) {
-  if (!any(way.active)) return false;
+  const float rounding = eye.rounding;
   Ints index = Ints{} + eye.index;
   for (int i = 0; i < 3; ++i) index += __builtin_convertvector(way.at[i], Ints) * way.stride[i];
   index = way.active ? index : Ints{} + eye.index;
   Ints room;
-  gather(eye.room, index, room);
+  gather_bytes(eye.room, index + way.octant, room);
   const Ints lost = way.active & way.unsure & (room <= 1);
-  way.active &= ~lost;
+  const Ints going = way.active & ~lost, arrived = going & (room == 0);
 
   const Floats clear = __builtin_convertvector(room > 1 ? room : Ints{} + 1, Floats);
-  Floats leaves[3];
-  for (int i = 0; i < 3; ++i) leaves[i] = (way.at[i] + clear - way.from[i]) * way.per[i];
+  Floats beyond[3], leaves[3];
+  for (int i = 0; i < 3; ++i) {
+    beyond[i] = way.at[i] + clear;
+    leaves[i] = (beyond[i] - way.from[i]) * way.per[i];
+  }
   const Ints x = (leaves[0] <= leaves[1]) & (leaves[0] <= leaves[2]);
   const Ints y = ~x & (leaves[1] <= leaves[2]);
   const Ints through[3] = {x, y, ~x & ~y};
   const Floats leave = x ? leaves[0] : y ? leaves[1] : leaves[2];
 
-  const Ints arrived = way.active & (room == 0);
   arrivals.at = bits_of(arrived);
   arrivals.walked = bits_of(lost);
   arrivals.near = 0;
+  Ints done = ~going;
   if (arrivals.at != 0) {
-    const Floats beyond = leave - way.nearest;
-    const Ints undecided = arrived & (beyond < eye.rounding) & (beyond > -eye.rounding);
-    arrivals.near = bits_of(beyond <= 0.0F);
+    std::memcpy(arrivals.index, &index, sizeof(index));
+    const Floats over = leave - way.nearest;
+    arrivals.near = bits_of(over <= 0.0F);
+    const Ints undecided = arrived & (over < rounding) & (over > -rounding);
     if (const unsigned bits = bits_of(undecided); bits != 0 && eye.range_min_m > 0) {
       arrivals.at &= ~bits;
       arrivals.walked |= bits;
-      way.active &= ~undecided;
+      done |= undecided;
     }
+    if (eye.is_stopped) done |= arrived;
   }
-  arrivals.index = index;
 
   // On to the next room. The rays that end, or leave the grid, are done.
   const Floats over = leave - way.end;
-  const Ints ends = over > -eye.rounding;
-  arrivals.walked |= bits_of(way.active & ends & (over < eye.rounding));
-  Ints done = ends;
+  const Ints ends = over > -rounding;
+  if (any(ends & ~done)) {
+    arrivals.walked |= bits_of(ends & ~done & (over < rounding));
+    done |= ends;
+  }
   way.unsure = Ints{};
   for (int i = 0; i < 3; ++i) {
     const Floats point = way.from[i] + leave * way.size[i];
-    const Floats whole = __builtin_convertvector(__builtin_convertvector(point, Ints), Floats);
-    const Floats part = point - whole;
-    way.unsure |= ~through[i] & ((part < eye.rounding) | (part > 1.0F - eye.rounding));
-    way.at[i] = through[i] ? way.at[i] + clear : whole;
-    done |= __builtin_convertvector(way.at[i], Ints) > way.left[i];
+    // Where rounding could decide, the lower one: its room holds both.
+    const Floats whole = __builtin_convertvector(__builtin_convertvector(point - rounding, Ints), Floats);
+    way.unsure |= ~through[i] & (point - whole > 1.0F - rounding);
+    way.at[i] = through[i] ? beyond[i] : whole;
+    done |= way.at[i] > way.left[i];
   }
-  way.active &= ~done;
-  return true;
+  const Ints active = ~done;
+  way.active = active;
+  return any(active);
 }
-FIRSTLOOK_AVX2 void start_avx2(const Eye& eye, const Packet& packet, Way& way) { start(eye, packet, way); }
-void start_portable(const Eye& eye, const Packet& packet, Way& way) { start(eye, packet, way); }
+FIRSTLOOK_AVX2 void start_avx2(const Eye& eye, const Eigen::Vector3d* ends_m, unsigned lanes, Way& way) {
+  start(eye, ends_m, lanes, way);
+}
+void start_portable(const Eye& eye, const Eigen::Vector3d* ends_m, unsigned lanes, Way& way) {
+  start(eye, ends_m, lanes, way);
+}
 FIRSTLOOK_AVX2 bool advance_avx2(const Eye& eye, Way& way, Arrivals& arrivals) { return advance(eye, way, arrivals); }
 bool advance_portable(const Eye& eye, Way& way, Arrivals& arrivals) { return advance(eye, way, arrivals); }
 
@@ -249,7 +262,9 @@ Eye eye_of(const View& view) {
     eye.stride[i] = strides[i];
     eye.index += eye.voxel[i] * strides[i];
   }
+  eye.count = static_cast<std::int32_t>(g.count());
   eye.room = view.plane.room().data();
+  eye.is_stopped = view.plane.reading() == UnknownReading::kStop;
   // Some ten roundings of numbers up to the grid's size.
   eye.rounding = 1e-4F + 1e-6F * static_cast<float>(g.size.maxCoeff());
   eye.range_min_m = static_cast<float>(view.range_min_m);
@@ -260,18 +275,21 @@ Eye eye_of(const View& view) {
 struct Flight {
   Way way;
   std::span<const Eigen::Vector3d> ends_m;  // at most kLanes
-  unsigned walked;                          // lanes
-  bool is_over;
+  unsigned walked = 0;                      // lanes
+  bool is_over = false;
 };
 
 void take_off(const Eye& eye, std::span<const Eigen::Vector3d> ends_m, Flight& flight) {
-  Packet packet{};
-  packet.lanes = (1U << ends_m.size()) - 1;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Eigen::Vector3d& end_m = ends_m[std::min(lane, ends_m.size() - 1)];
-    for (int i = 0; i < 3; ++i) packet.end_m[i][lane] = static_cast<float>(end_m[i]);
+  const unsigned lanes = (1U << ends_m.size()) - 1;
+  const auto begin = has_avx2() ? start_avx2 : start_portable;
+  if (ends_m.size() == kLanes) {
+    begin(eye, ends_m.data(), lanes, flight.way);
+  } else {
+    std::array<Eigen::Vector3d, kLanes> filled;
+    filled.fill(ends_m.back());
+    std::copy(ends_m.begin(), ends_m.end(), filled.begin());
+    begin(eye, filled.data(), lanes, flight.way);
   }
-  (has_avx2() ? start_avx2 : start_portable)(eye, packet, flight.way);
   flight.ends_m = ends_m;
   flight.walked = 0;
   flight.is_over = false;
@@ -282,7 +300,8 @@ void arrive(View& view, const Arrivals& arrivals, Flight& flight) {
   for (unsigned bits = arrivals.at; bits != 0; bits &= bits - 1) {
     const int lane = std::countr_zero(bits);
     const bool far_enough = (arrivals.near >> lane & 1) == 0;
-    if (!view.meet(static_cast<std::size_t>(arrivals.index[lane]), far_enough)) flight.way.active[lane] = 0;
+    const auto voxel = static_cast<std::size_t>(arrivals.index[lane]);
+    if (!view.meet(voxel, far_enough)) flight.way.active[lane] = 0;
   }
 }
 
@@ -299,12 +318,9 @@ void count_packets(View& view, const Eye& eye, std::span<const Eigen::Vector3d> 
       for (Flight& flight : std::span(flights).first(flying)) {
         if (flight.is_over) continue;
         Arrivals arrivals;
-        if (!step(eye, flight.way, arrivals)) {
-          flight.is_over = true;
-          --left;
-        } else if ((arrivals.at | arrivals.walked) != 0) {
-          arrive(view, arrivals, flight);
-        }
+        flight.is_over = !step(eye, flight.way, arrivals);
+        if (flight.is_over) --left;
+        if ((arrivals.at | arrivals.walked) != 0) arrive(view, arrivals, flight);
       }
     }
     for (const Flight& flight : std::span(flights).first(flying)) {
@@ -314,54 +330,68 @@ void count_packets(View& view, const Eye& eye, std::span<const Eigen::Vector3d> 
   }
 }
 
-/// Distances in the maximum norm grow by one from neighbour to neighbour: a sweep forwards and one backwards find them
-/// (Rosenfeld and Pfaltz 1968). A row gets what its neighbours in the sweep leave it.
+/// A row of rooms being found. Rows have kRoomMax voxels of nothing on either side.
 struct RowSweep {
-  const std::uint8_t* rows[4];  // neighbours already swept
-  std::uint8_t* row;
-  std::uint8_t* scratch;  // [0] and [size + 1] are beside the grid
+  const std::uint8_t* rows[3];  // neighbours already swept, without these sides
+  std::uint8_t* room;           // in: 0 where there is something to do
+  std::uint8_t* cubes;          // scratch, as
+  std::uint8_t* other;
   std::size_t size;
+  std::ptrdiff_t ahead;  // 1 or -1
 };
-constexpr std::uint8_t kRoomMax = 100;
+constexpr std::uint8_t kRoomMax = 254;
 
-[[gnu::always_inline]] inline void take_from_rows(const RowSweep& s) {
-  for (std::size_t x = 0; x < s.size; ++x)
-    s.scratch[x + 1] = std::min(std::min(s.rows[0][x], s.rows[1][x]), std::min(s.rows[2][x], s.rows[3][x]));
+/// The largest empty cube with a voxel at its near corner is one larger than the smallest of those at the seven voxels
+/// beyond it. Along the row that is a minimum over all voxels ahead, found by doubling.
+[[gnu::always_inline]] inline void sweep_row(const RowSweep& row) {
+  const RowSweep s = row;  // bytes that are written do not lie in it
+  std::uint8_t* __restrict nearest = s.other;
+  for (std::size_t x = 0; x < s.size; ++x) nearest[x] = std::min(std::min(s.rows[0][x], s.rows[1][x]), s.rows[2][x]);
+  std::uint8_t* __restrict cubes = s.cubes;
   for (std::size_t x = 0; x < s.size; ++x) {
-    const std::uint8_t nearest = std::min(std::min(s.scratch[x], s.scratch[x + 1]), s.scratch[x + 2]);
-    s.row[x] = std::min(s.row[x], static_cast<std::uint8_t>(nearest + 1));
+    const std::uint8_t smallest = std::min(nearest[x], nearest[static_cast<std::ptrdiff_t>(x) + s.ahead]);
+    const auto grown = static_cast<std::uint8_t>(std::min<std::uint8_t>(smallest, kRoomMax - 1) + 1);
+    cubes[x] = s.room[x] == 0 ? std::uint8_t{0} : grown;
   }
+  std::uint8_t *from = s.cubes, *to = s.other;
+  for (std::size_t step = 1; step < std::min<std::size_t>(s.size, kRoomMax); step *= 2) {
+    const std::uint8_t* __restrict here = from;
+    const std::uint8_t* __restrict there = from + s.ahead * static_cast<std::ptrdiff_t>(step);
+    std::uint8_t* __restrict out = to;
+    const auto grows = static_cast<std::uint8_t>(step), most = static_cast<std::uint8_t>(kRoomMax - step);
+    for (std::size_t x = 0; x < s.size; ++x)
+      out[x] = std::min(here[x], static_cast<std::uint8_t>(std::min(there[x], most) + grows));
+    std::swap(from, to);
+  }
+  std::copy_n(from, s.size, s.room);
 }
-FIRSTLOOK_AVX2 void take_from_rows_avx2(const RowSweep& s) { take_from_rows(s); }
-void take_from_rows_portable(const RowSweep& s) { take_from_rows(s); }
+FIRSTLOOK_AVX2 void sweep_row_avx2(const RowSweep& s) { sweep_row(s); }
+void sweep_row_portable(const RowSweep& s) { sweep_row(s); }
 
-void sweep(const GridGeometry& g, int step, std::span<std::uint8_t> room, std::span<std::uint8_t> scratch) {
+/// The rooms of rays that go backwards along the axes whose bits are set in `octant`.
+/// @param room  in: 0 where there is something to do
+void sweep_octant(const GridGeometry& g, unsigned octant, std::span<std::uint8_t> room,
+                  std::span<std::uint8_t> scratch) {
   const auto nx = static_cast<std::size_t>(g.size.x());
+  const auto padded_row = [&](std::size_t i) { return scratch.data() + i * (nx + 2 * kRoomMax) + kRoomMax; };
   std::fill(scratch.begin(), scratch.end(), kRoomMax);
-  const std::uint8_t* beside = scratch.data() + nx + 2;  // a row of nothing
-  const auto row_at = [&](int y, int z) {
+  const int ahead_y = (octant & 2) != 0 ? -1 : 1, ahead_z = (octant & 4) != 0 ? -1 : 1;
+  const auto row_at = [&](int y, int z) -> std::uint8_t* {
+    if (y < 0 || z < 0 || y >= g.size.y() || z >= g.size.z()) return padded_row(2);  // nothing
     return room.data() +
            (static_cast<std::size_t>(z) * static_cast<std::size_t>(g.size.y()) + static_cast<std::size_t>(y)) * nx;
   };
-  const auto inside = [&](int y, int z) { return y >= 0 && z >= 0 && y < g.size.y() && z < g.size.z(); };
   for (int k = 0; k < g.size.z(); ++k) {
-    const int z = step > 0 ? k : g.size.z() - 1 - k;
+    const int z = ahead_z > 0 ? g.size.z() - 1 - k : k;
     for (int j = 0; j < g.size.y(); ++j) {
-      const int y = step > 0 ? j : g.size.y() - 1 - j;
-      const auto neighbour = [&](int at_y, int at_z) { return inside(at_y, at_z) ? row_at(at_y, at_z) : beside; };
-      std::uint8_t* row = row_at(y, z);
-      const RowSweep s{
-          {neighbour(y - step, z), neighbour(y - 1, z - step), neighbour(y, z - step), neighbour(y + 1, z - step)},
-          row,
-          scratch.data(),
-          nx};
-      has_avx2() ? take_from_rows_avx2(s) : take_from_rows_portable(s);
-      std::uint8_t before = kRoomMax;
-      for (std::size_t i = 0; i < nx; ++i) {
-        std::uint8_t& here = step > 0 ? row[i] : row[nx - 1 - i];
-        here = std::min(here, static_cast<std::uint8_t>(before + 1));
-        before = here;
-      }
+      const int y = ahead_y > 0 ? g.size.y() - 1 - j : j;
+      (has_avx2() ? sweep_row_avx2 : sweep_row_portable)(
+          {.rows = {row_at(y + ahead_y, z), row_at(y, z + ahead_z), row_at(y + ahead_y, z + ahead_z)},
+           .room = row_at(y, z),
+           .cubes = padded_row(0),
+           .other = padded_row(1),
+           .size = nx,
+           .ahead = (octant & 1) != 0 ? -1 : 1});
     }
   }
 }
@@ -391,18 +421,22 @@ GainRays GainRays::pinhole(const CameraIntrinsics& c, int columns, int rows, dou
 }
 
 GainPlane::GainPlane(const GridGeometry& geometry)
-    : geometry_(geometry), what_(geometry.count(), 0), room_(geometry.count(), 0) {
-  row_.resize(2 * static_cast<std::size_t>(geometry.size.x()) + 2);
+    : geometry_(geometry), what_(geometry.count(), 0), room_(kOctants * geometry.count() + kReadBeyond, 0) {
+  ENSURE(3049, geometry.count() < std::numeric_limits<std::int32_t>::max() / kOctants);
+  rows_.resize(3 * (static_cast<std::size_t>(geometry.size.x()) + 2 * kRoomMax));
 }
 
 void GainPlane::prepare(UnknownReading reading) {
   reading_ = reading;
-  for (std::size_t i = 0; i < what_.size(); ++i) {
-    const bool nothing = what_[i] == 0 || (what_[i] == kUnknownNoWeight && reading == UnknownReading::kSeeThrough);
-    room_[i] = nothing ? kRoomMax : std::uint8_t{0};
+  const std::span<std::uint8_t> rooms(room_);
+  for (unsigned octant = 0; octant < kOctants; ++octant) {
+    const std::span<std::uint8_t> room = rooms.subspan(octant * what_.size(), what_.size());
+    for (std::size_t i = 0; i < what_.size(); ++i) {
+      const bool nothing = what_[i] == 0 || (what_[i] == kUnknownNoWeight && reading == UnknownReading::kSeeThrough);
+      room[i] = nothing ? std::uint8_t{1} : std::uint8_t{0};
+    }
+    sweep_octant(geometry_, octant, room, rows_);
   }
-  sweep(geometry_, 1, room_, row_);
-  sweep(geometry_, -1, room_, row_);
 }
 
 void build_gain_plane(const VoxelMap& map, std::span<const std::uint8_t> weights, UnknownReading reading,

@@ -36,7 +36,9 @@ inline constexpr std::uint8_t kOpaque = 255;
 class GainPlane {
  public:
   explicit GainPlane(const GridGeometry& geometry);
-  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry) { return 2 * geometry.count(); }
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry) {
+    return (1 + kOctants) * geometry.count();
+  }
 
   /// Fill it, then call prepare().
   [[nodiscard]] std::span<std::uint8_t> what() { return what_; }
@@ -46,15 +48,19 @@ class GainPlane {
 
   [[nodiscard]] const GridGeometry& geometry() const { return geometry_; }
   [[nodiscard]] UnknownReading reading() const { return reading_; }
-  /// Half edge of a cube around the voxel, less half a voxel, in which no ray has anything to do: voxels nearer than
-  /// this, in the maximum norm. 0 where it has.
+  /// For rays of each octant of directions the edge of the largest cube, from the voxel on in their direction, in which
+  /// none of them has anything to do; 0 where it has. All voxels for directions that go up along every axis, then those
+  /// that go down along x, and so on by the bits of an octant's number.
   [[nodiscard]] std::span<const std::uint8_t> room() const { return room_; }
 
  private:
+  static constexpr std::size_t kOctants = 8;
+  static constexpr std::size_t kReadBeyond = 3;  ///< bytes are fetched as words
+
   GridGeometry geometry_;
   UnknownReading reading_ = UnknownReading::kStop;
   std::vector<std::uint8_t> what_, room_;
-  std::vector<std::uint8_t> row_;  ///< scratch: one row and a voxel on either side
+  std::vector<std::uint8_t> rows_;  ///< scratch
 };
 
 /// Fills and prepares a plane from the map: unknown voxels get their weight, free ones pass, occupied ones stop.
@@ -75,11 +81,12 @@ class GainScratch {
 
   /// Starts a new view: nothing is marked.
   void begin();
-  /// True the first time in this view.
-  [[nodiscard]] bool mark(std::size_t index) {
-    if (epoch_of_[index] == epoch_) return false;
-    epoch_of_[index] = epoch_;
-    return true;
+  /// True the first time in this view that it is wanted. No branch: nobody could foresee it.
+  [[nodiscard]] bool mark(std::size_t index, bool wanted = true) {
+    const std::uint8_t before = epoch_of_[index];
+    const bool is_new = wanted && before != epoch_;
+    epoch_of_[index] = is_new ? epoch_ : before;
+    return is_new;
   }
 
  private:

@@ -9,17 +9,23 @@
 namespace firstlook {
 namespace {
 
+// What lies beside the image has no ray.
+float reach_at(const RangeImage& image, int u, int v) {
+  const bool inside = u >= 0 && v >= 0 && u < image.width() && v < image.height();
+  return inside ? image.at(u, v) : RangeImage::kNoRay;
+}
+
 struct Bounds {
-  float nearest, farthest;
+  float nearest, farthest;  // nearest: of cells of 2 x 2 pixels as far as their farthest pixel
 };
-// Of pixels, one by one; what lies beside the image has no ray.
+// Cell by cell, pixel by pixel; both ends even.
 Bounds plain_bounds(const RangeImage& image, int u_low, int v_low, int u_end, int v_end) {
   Bounds bounds{1e9F, RangeImage::kNoRay};
-  for (int v = v_low; v < v_end; ++v) {
-    for (int u = u_low; u < u_end; ++u) {
-      const bool inside = u >= 0 && v >= 0 && u < image.width() && v < image.height();
-      const float reach_m = inside ? image.at(u, v) : RangeImage::kNoRay;
-      bounds = {std::min(bounds.nearest, reach_m), std::max(bounds.farthest, reach_m)};
+  for (int v = v_low; v < v_end; v += 2) {
+    for (int u = u_low; u < u_end; u += 2) {
+      const float cell_m = std::max(
+          {reach_at(image, u, v), reach_at(image, u + 1, v), reach_at(image, u, v + 1), reach_at(image, u + 1, v + 1)});
+      bounds = {std::min(bounds.nearest, cell_m), std::max(bounds.farthest, cell_m)};
     }
   }
   return bounds;
