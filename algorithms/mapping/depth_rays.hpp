@@ -1,6 +1,7 @@
 /// The rays of a depth frame: which pixels count, and where each ends in base coordinates.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -35,6 +36,11 @@ struct PixelCounts {
   std::uint32_t pixels_self = 0;      ///< on the arm's own body: dropped
 };
 
+/// What became of a pixel. Only the first two have a ray.
+enum class PixelKind : std::uint8_t { kHit, kBeyond, kNoDirection, kEmpty, kSelf, kTooNear };
+inline constexpr std::size_t kPixelKinds = 6;
+[[nodiscard]] PixelCounts counts_of(const std::array<std::uint32_t, kPixelKinds>& pixels);
+
 /// Where the ray of a pixel ends.
 struct RayEnd {
   Eigen::Vector3f end_m = Eigen::Vector3f::Zero();  ///< base coordinates, rounded to float as octomap::point3d is
@@ -42,13 +48,21 @@ struct RayEnd {
   bool is_hit = false;                              ///< false: cut at range_m()
 };
 
-/// What became of a pixel. Only the first two have a ray.
-enum class PixelKind : std::uint8_t { kHit, kBeyond, kNoDirection, kEmpty, kSelf, kTooNear };
-
 /// One row of pixels, an array for each quantity. Those of pixels without a ray mean nothing.
 struct RayRow {
   std::vector<PixelKind> kind;
   std::vector<float> end_x_m, end_y_m, end_z_m, reach_m;  ///< as in RayEnd
+};
+
+/// What is the same for all rays of a frame.
+struct RayFrame {
+  double units_per_m;
+  double rotation[3][3];  // base_R_depth
+  double translation_m[3];
+  float origin_m[3];
+  double range_m;
+  float range_squared_m2;  // the largest whose root is within the range
+  std::int32_t value_min;  // the first value that is not too near
 };
 
 /// The directions of a sensor's pixels; memory is taken at construction.
@@ -62,9 +76,6 @@ class DepthRays {
   [[nodiscard]] double range_m() const { return range_m_; }
   /// A pinhole image has one direction for each column and row; a distorted one does not.
   [[nodiscard]] bool is_pinhole() const { return !per_pixel_; }
-  /// x / z of each column and y / z of each row of a pinhole image.
-  [[nodiscard]] std::span<const double> column_slopes() const { return ray_x_; }
-  [[nodiscard]] std::span<const double> row_slopes() const { return ray_y_; }
 
   /// A pixel's ray at depth 1; NaN where the lens model has none.
   [[nodiscard]] Eigen::Vector3d direction(int u, int v) const {
@@ -87,40 +98,39 @@ class DepthRays {
   PixelCounts for_each(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                        std::span<const float> self_depth_m, Visit visit);
 
-  /// The ray of one pixel again; it must have one.
-  [[nodiscard]] RayEnd ray(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth, int u, int v);
+  [[nodiscard]] RayFrame frame(double units_per_m, const Transform<Base, Depth>& base_T_depth) const;
+  /// The ray of one pixel alone; it must have one.
+  [[nodiscard]] RayEnd ray(const RayFrame& frame, const DepthImage& depth, int u, int v) const;
 
   /// The smallest box around the sensor and all ray ends of a frame that passes check().
   [[nodiscard]] AxisBox bounds(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth);
 
  private:
-  void compute_row(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
-                   std::span<const float> self_depth_m, int v);
+  void compute_row(const RayFrame& frame, const DepthImage& depth, std::span<const float> self_depth_m, int v);
 
   DepthSensor sensor_;
   double range_m_ = 0;
+  float range_squared_m2_ = 0;
   bool per_pixel_ = false;     ///< a distorted image has a direction for each pixel
   std::vector<double> ray_x_;  ///< x / z for each column or pixel; NaN where the lens model has no ray
   std::vector<double> ray_y_;  ///< y / z for each row or pixel
   RayRow row_;
-  std::vector<double> row_y_, row_z_m_, row_distance_m_;
+  std::vector<double> row_y_, row_z_m_;
+  std::vector<float> row_squared_m2_;
 };
 
 template <typename Visit>
 PixelCounts DepthRays::for_each_row(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                                     std::span<const float> self_depth_m, Visit visit) {
-  std::array<std::uint32_t, 6> counted{};
+  std::array<std::uint32_t, kPixelKinds> counted{};
+  const RayFrame ray_frame = frame(depth.units_per_m, base_T_depth);
   for (int v = 0; v < depth.pixels.height; ++v) {
-    compute_row(depth, base_T_depth, self_depth_m, v);
-    for (const PixelKind kind : row_.kind) ++counted[static_cast<std::size_t>(kind)];
+    compute_row(ray_frame, depth, self_depth_m, v);
+    for (std::size_t kind = 0; kind < counted.size(); ++kind)
+      counted[kind] += static_cast<std::uint32_t>(std::count(row_.kind.begin(), row_.kind.end(), PixelKind(kind)));
     visit(v, row_);
   }
-  const auto count = [&counted](PixelKind kind) { return counted[static_cast<std::size_t>(kind)]; };
-  return {.pixels_used = count(PixelKind::kHit),
-          .pixels_beyond = count(PixelKind::kBeyond) + count(PixelKind::kNoDirection),
-          .pixels_empty = count(PixelKind::kEmpty),
-          .pixels_too_near = count(PixelKind::kTooNear),
-          .pixels_self = count(PixelKind::kSelf)};
+  return counts_of(counted);
 }
 
 template <typename Visit>

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "platform/core/ensure.hpp"
+#include "platform/core/processor.hpp"
 
 namespace firstlook {
 namespace {
@@ -14,88 +15,134 @@ constexpr double kRounding_m = 1e-6;
 
 std::size_t to_size(int n) { return static_cast<std::size_t>(n); }
 
+/// One row among its neighbours along another axis.
+struct Neighbours {
+  const std::uint16_t* row;
+  std::ptrdiff_t stride;  // to the next row along the axis
+  int before, after;      // rows on either side; beyond them nothing is free
+  int reach;
+  std::size_t size;
+};
+
+/// out = min over k of row[k] + k², from the row itself outwards until nothing nearer can come.
+[[gnu::always_inline]] inline void lower_envelope(const Neighbours& n, std::uint16_t* __restrict out) {
+  const int edge = std::min({n.before + 1, n.after + 1, n.reach});
+  const auto outside = static_cast<std::uint16_t>(edge * edge);
+  for (std::size_t x = 0; x < n.size; ++x) out[x] = std::min(n.row[x], outside);
+  std::uint16_t farthest = outside;
+  for (int k = 1; k < edge && k * k < farthest; ++k) {
+    const auto square = static_cast<std::uint16_t>(k * k);
+    const std::uint16_t* before = n.row - k * n.stride;
+    const std::uint16_t* after = n.row + k * n.stride;
+    farthest = 0;
+    for (std::size_t x = 0; x < n.size; ++x) {
+      const auto through = static_cast<std::uint16_t>(std::min(before[x], after[x]) + square);
+      out[x] = std::min(out[x], through);
+      farthest = std::max(farthest, out[x]);
+    }
+  }
+}
+FIRSTLOOK_AVX2 void lower_envelope_avx2(const Neighbours& n, std::uint16_t* out) { lower_envelope(n, out); }
+void lower_envelope_portable(const Neighbours& n, std::uint16_t* out) { lower_envelope(n, out); }
+
 }  // namespace
 
 DistanceField::DistanceField(const GridGeometry& geometry, double distance_max_m)
-    : geometry_(geometry), distance_max_m_(distance_max_m), per_m_(1 / geometry.resolution_m) {
+    : geometry_(geometry),
+      distance_max_m_(std::min(distance_max_m, kReachMax * geometry.resolution_m)),
+      per_m_(1 / geometry.resolution_m) {
   ENSURE(3011, geometry.resolution_m > 0 && (geometry.size.array() > 0).all() && distance_max_m > 0);
-  squared_.assign(geometry.count(), 0);
+  reach_ = std::min(kReachMax, static_cast<int>(std::ceil(distance_max_m_ / geometry.resolution_m)));
+  const std::size_t rows = to_size(geometry.size.y()) * to_size(geometry.size.z());
+  free_.assign(geometry.count(), 0);
+  along_x_.assign(geometry.count(), 0);
+  within_layer_.assign(geometry.count(), 0);
   values_.assign(geometry.count(), 0);
-  const std::size_t line = to_size(geometry.size.maxCoeff()) + 2;
-  line_.assign(line, 0);
-  site_.assign(line, 0);
-  start_.assign(line, 0);
+  row_changed_.assign(rows, 0);
+  layer_changed_.assign(rows, 0);
+  scratch_.assign(to_size(geometry.size.x()), 0);
 }
 
 std::size_t DistanceField::required_bytes(const GridGeometry& geometry) {
-  return geometry.count() * (sizeof(std::int32_t) + sizeof(float)) +
-         3 * sizeof(std::int32_t) * (to_size(geometry.size.maxCoeff()) + 2);
+  return geometry.count() * (sizeof(std::uint8_t) + 2 * sizeof(std::uint16_t) + sizeof(float)) +
+         2 * to_size(geometry.size.y()) * to_size(geometry.size.z()) +
+         sizeof(std::uint16_t) * to_size(geometry.size.x());
 }
 
-void DistanceField::rebuild(std::span<const std::uint8_t> free_mask) {
-  ENSURE(3012, free_mask.size() == squared_.size());
-  scan_rows(free_mask);
-  scan_lines(1);
-  scan_lines(2);
-  const auto cut = static_cast<float>(distance_max_m_);
-  const auto resolution = static_cast<float>(geometry_.resolution_m);
-  for (std::size_t i = 0; i < values_.size(); ++i)
-    values_[i] = std::min(cut, resolution * std::sqrt(static_cast<float>(squared_[i])));
+std::size_t DistanceField::update(std::span<const std::uint8_t> free_mask) {
+  ENSURE(3012, free_mask.size() == values_.size());
+  follow_mask(free_mask);
+  add_axis_y();
+  return add_axis_z();
 }
 
-// Distance along x to the nearest voxel that is not free; the voxels just outside the row are not free.
-void DistanceField::scan_rows(std::span<const std::uint8_t> free_mask) {
+// Along x two runs tell all; the voxels just outside the row are not free.
+void DistanceField::follow_mask(std::span<const std::uint8_t> free_mask) {
   const std::size_t nx = to_size(geometry_.size.x());
-  for (std::size_t row = 0; row < squared_.size(); row += nx) {
-    std::int32_t run = 0;
+  for (std::size_t row = 0; row < row_changed_.size(); ++row) {
+    const auto mask = free_mask.subspan(row * nx, nx);
+    std::uint8_t* kept = free_.data() + row * nx;
+    row_changed_[row] = std::equal(mask.begin(), mask.end(), kept) ? 0 : 1;
+    if (row_changed_[row] == 0) continue;
+    std::copy(mask.begin(), mask.end(), kept);
+    std::uint16_t* squared = along_x_.data() + row * nx;
+    int run = 0;
     for (std::size_t x = 0; x < nx; ++x) {
-      run = free_mask[row + x] != 0 ? run + 1 : 0;
-      squared_[row + x] = run;
+      run = mask[x] != 0 ? std::min(run + 1, reach_) : 0;
+      squared[x] = static_cast<std::uint16_t>(run);
     }
     run = 0;
     for (std::size_t x = nx; x-- > 0;) {
-      run = free_mask[row + x] != 0 ? run + 1 : 0;
-      const std::int32_t nearer = std::min(run, squared_[row + x]);
-      squared_[row + x] = nearer * nearer;
+      run = mask[x] != 0 ? std::min(run + 1, reach_) : 0;
+      const int nearer = std::min<int>(run, squared[x]);
+      squared[x] = static_cast<std::uint16_t>(nearer * nearer);
     }
   }
 }
 
-// Lower envelope of the parabolas of one line after another (Meijster et al. 2000, second phase). Position 0 and
-// n + 1 of a line are the voxels outside the grid, at distance 0; so the first parabola is never replaced.
-void DistanceField::scan_lines(int axis) {
-  const auto n = static_cast<std::int32_t>(geometry_.size[axis]);
-  const std::size_t nx = to_size(geometry_.size.x()), ny = to_size(geometry_.size.y());
-  const std::size_t stride = axis == 1 ? nx : nx * ny;
-  const std::size_t others = axis == 1 ? to_size(geometry_.size.z()) : ny;
-  const std::size_t others_stride = axis == 1 ? nx * ny : nx;
-  for (std::size_t other = 0; other < others; ++other) {
-    for (std::size_t x = 0; x < nx; ++x) {
-      const std::size_t first = other * others_stride + x;
-      line_[0] = line_[to_size(n) + 1] = 0;
-      for (std::int32_t i = 0; i < n; ++i) line_[to_size(i) + 1] = squared_[first + to_size(i) * stride];
-
-      std::size_t top = 0;
-      site_[0] = start_[0] = 0;
-      const auto height = [&](std::int32_t at, std::int32_t site) {
-        return (at - site) * (at - site) + line_[to_size(site)];
-      };
-      for (std::int32_t u = 1; u <= n + 1; ++u) {
-        while (top > 0 && height(start_[top], site_[top]) > height(start_[top], u)) --top;
-        const std::int32_t s = site_[top];
-        const std::int32_t numerator = u * u - s * s + line_[to_size(u)] - line_[to_size(s)];
-        const std::int32_t from = 1 + numerator / (2 * (u - s));
-        if (from > n + 1) continue;
-        ++top;
-        site_[top] = u;
-        start_[top] = from;
-      }
-      for (std::int32_t u = n + 1; u >= 0; --u) {
-        if (u >= 1 && u <= n) squared_[first + to_size(u - 1) * stride] = height(u, site_[top]);
-        if (u == start_[top] && top > 0) --top;
-      }
-    }
+bool DistanceField::any_near(const std::vector<std::uint8_t>& rows, std::size_t first, std::size_t stride, int middle,
+                             int count) const {
+  const int last = std::min(count - 1, middle + reach_);
+  for (int i = std::max(0, middle - reach_); i <= last; ++i) {
+    if (rows[first + to_size(i) * stride] != 0) return true;
   }
+  return false;
+}
+
+void DistanceField::add_axis_y() {
+  const std::size_t nx = to_size(geometry_.size.x());
+  const int ny = geometry_.size.y();
+  for (std::size_t row = 0; row < row_changed_.size(); ++row) {
+    const int y = static_cast<int>(row) % ny;
+    layer_changed_[row] = 0;
+    if (!any_near(row_changed_, row - to_size(y), 1, y, ny)) continue;
+    const Neighbours rows{along_x_.data() + row * nx, geometry_.size.x(), y, ny - 1 - y, reach_, nx};
+    has_avx2() ? lower_envelope_avx2(rows, scratch_.data()) : lower_envelope_portable(rows, scratch_.data());
+    std::uint16_t* kept = within_layer_.data() + row * nx;
+    if (std::equal(scratch_.begin(), scratch_.end(), kept)) continue;
+    std::copy(scratch_.begin(), scratch_.end(), kept);
+    layer_changed_[row] = 1;
+  }
+}
+
+std::size_t DistanceField::add_axis_z() {
+  const std::size_t nx = to_size(geometry_.size.x()), ny = to_size(geometry_.size.y());
+  const int nz = geometry_.size.z();
+  const auto cut = static_cast<float>(distance_max_m_);
+  const auto resolution = static_cast<float>(geometry_.resolution_m);
+  std::size_t updated = 0;
+  for (std::size_t row = 0; row < layer_changed_.size(); ++row) {
+    const int z = static_cast<int>(row / ny);
+    if (!any_near(layer_changed_, row % ny, ny, z, nz)) continue;
+    const Neighbours rows{
+        within_layer_.data() + row * nx, static_cast<std::ptrdiff_t>(nx * ny), z, nz - 1 - z, reach_, nx};
+    has_avx2() ? lower_envelope_avx2(rows, scratch_.data()) : lower_envelope_portable(rows, scratch_.data());
+    float* value = values_.data() + row * nx;
+    for (std::size_t x = 0; x < nx; ++x)
+      value[x] = std::min(cut, resolution * std::sqrt(static_cast<float>(scratch_[x])));
+    ++updated;
+  }
+  return updated;
 }
 
 double DistanceField::distance_m(const Eigen::Vector3d& point_m) const {

@@ -2,72 +2,69 @@
 /// algorithms/mapping.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
 
 namespace firstlook {
 
-/// Pixels from (u_low, v_low) to (u_high, v_high), both included.
-struct PixelRect {
-  int u_low = 0, v_low = 0, u_high = -1, v_high = -1;
-  [[nodiscard]] bool empty() const { return u_low > u_high || v_low > v_high; }
+/// A quantity for each pixel (level 0), for cells of 2 x 2 pixels (level 1), 4 x 4, and so on. All levels lie in one
+/// array with one stride, so that questions about different levels are one vector of indices. Up to eight numbers may
+/// be read from any place of a row on; what lies beside the image is what fill() said.
+class Pyramid {
+ public:
+  Pyramid(int width, int height, int first_level);
+  [[nodiscard]] static std::size_t required_bytes(int width, int height, int first_level);
+
+  [[nodiscard]] const float* data() const { return values_.data(); }
+  [[nodiscard]] int stride() const { return stride_; }
+  /// The first row of a level is rows() - (rows() >> (level - first_level())).
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int first_level() const { return first_level_; }
+  [[nodiscard]] std::size_t index(int level, int x, int y) const {
+    return static_cast<std::size_t>(rows_ - (rows_ >> (level - first_level_)) + y) * static_cast<std::size_t>(stride_) +
+           static_cast<std::size_t>(x);
+  }
+  [[nodiscard]] float at(int level, int x, int y) const { return values_[index(level, x, y)]; }
+  [[nodiscard]] float* row(int level, int y) { return values_.data() + index(level, 0, y); }
+  [[nodiscard]] const float* row(int level, int y) const { return values_.data() + index(level, 0, y); }
+
+ private:
+  int stride_, rows_, first_level_;
+  std::vector<float> values_;
 };
 
-/// Depth of each ray's end along the optical axis (m), kept in tiles of 8 x 8 pixels, with the farthest and the nearest
-/// of each tile, of 2 x 2 tiles, and so on. Memory is taken at construction.
+/// Depth of each ray's end along the optical axis (m), and its bounds over areas. Memory is taken at construction.
 class RangeImage {
  public:
-  static constexpr int kTile = 8;
-  static constexpr int kTilePixels = kTile * kTile;
-  static constexpr float kNoRay = -1;  ///< of pixels without a ray
+  static constexpr float kNoRay = -1;  ///< of pixels without a ray, and of what lies beside the image
 
   RangeImage(int width, int height);
   [[nodiscard]] static std::size_t required_bytes(int width, int height);
 
-  /// A row of pixels; kNoRay for those without a ray. After the last one of a frame: build_levels().
+  /// A row of pixels to be filled, kNoRay for those without a ray; up to eight of these may follow it. After the last
+  /// row of a frame: build_levels().
+  [[nodiscard]] float* row(int v) { return farthest_.row(0, v); }
   void set_row(int v, std::span<const float> reach_m);
   void build_levels();
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
-  [[nodiscard]] int tiles_x() const { return levels_.front().width; }
-  [[nodiscard]] float at(int u, int v) const {
-    return tile(u / kTile,
-                v / kTile)[static_cast<std::size_t>(v % kTile) * kTile + static_cast<std::size_t>(u % kTile)];
-  }
-  /// All pixels, tile by tile, each row by row.
-  [[nodiscard]] std::span<const float> reach_m() const { return reach_m_; }
-  [[nodiscard]] std::span<const float> tile(int x, int y) const {
-    return std::span(reach_m_).subspan(static_cast<std::size_t>(y * tiles_x() + x) * kTilePixels, kTilePixels);
-  }
-  /// The farthest of 8 x 8 tiles, row by row; (x, y) counts such blocks. kNoRay where the image has no tile.
-  [[nodiscard]] std::span<const float> block(int x, int y) const {
-    return std::span(tile_farthest_m_).subspan(static_cast<std::size_t>(y * blocks_x_ + x) * kTilePixels, kTilePixels);
-  }
-  [[nodiscard]] float farthest() const { return levels_.back().at(0, 0).farthest; }
-
-  struct Bounds {
-    float nearest = kNoRay;   ///< kNoRay when any pixel has no ray
-    float farthest = kNoRay;  ///< kNoRay when none has one
-  };
-  /// Bounds of what the rays inside a rectangle reach, from at most nine tiles that cover it: not the tightest.
-  [[nodiscard]] Bounds bounds(const PixelRect& rect) const;
+  [[nodiscard]] int level_max() const { return level_max_; }  ///< one cell covers the image
+  [[nodiscard]] float at(int u, int v) const { return farthest_.at(0, u, v); }
+  [[nodiscard]] float farthest() const { return farthest_.at(level_max_, 0, 0); }
+  /// Of each cell, from level 0 on.
+  [[nodiscard]] const Pyramid& cell_farthest() const { return farthest_; }
+  /// Of each cell and the eight around it, from level 1 on. The nearest is that of cells of 2 x 2 pixels, each of which
+  /// reaches as far as its farthest pixel does: single pixels without a return hide nothing.
+  [[nodiscard]] const Pyramid& around_farthest() const { return around_farthest_; }
+  [[nodiscard]] const Pyramid& around_nearest() const { return around_nearest_; }
 
  private:
-  struct Level {
-    int width = 0, height = 0;
-    std::vector<Bounds> tiles;
-    [[nodiscard]] const Bounds& at(int x, int y) const {
-      return tiles[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
-    }
-  };
-  int width_, height_;
-  std::vector<float> reach_m_;
-  int blocks_x_ = 0;
-  std::vector<float> tile_farthest_m_;
-  std::vector<Level> levels_;
+  int width_, height_, level_max_;
+  Pyramid farthest_, nearest_, around_farthest_, around_nearest_;
+  std::vector<float> nothing_;  ///< a row beside the image
+  std::vector<float> scratch_;  ///< a row with a cell beside the image before it
 };
 
 }  // namespace firstlook

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "platform/core/fixed_vector.hpp"
+#include "platform/core/processor.hpp"
+
 namespace firstlook {
 namespace {
 
@@ -26,6 +29,42 @@ std::uint64_t pack_biased(const Eigen::Vector3i& v) {
 bool well_inside(const GridGeometry& geometry, const Eigen::Vector3i& v) {
   return (v.array() >= 1).all() && ((geometry.size - v).array() >= 2).all();
 }
+
+// Four rays side by side: AVX2 registers, or what the compiler makes of them elsewhere; the same bits.
+constexpr std::size_t kTogether = 4;
+using Doubles [[gnu::vector_size(32)]] = double;
+using Longs [[gnu::vector_size(32)]] = std::int64_t;
+struct Walks {
+  Doubles next[3], delta[3], length;
+  Longs index, index_step[3], index_end, steps;
+};
+
+[[gnu::always_inline]] inline void set_bits(const Longs& index, std::uint64_t* plane) {
+  for (std::size_t i = 0; i < kTogether; ++i) {
+    const auto bit = static_cast<std::uint64_t>(index[i]);
+    plane[bit >> 6] |= 1ULL << (bit & 63);
+  }
+}
+/// RayMarker::walk without its branches.
+[[gnu::always_inline]] inline void walk_four(const Walks& w, std::uint64_t* plane) {
+  Doubles x = w.next[0], y = w.next[1], z = w.next[2];
+  Longs index = w.index, last = w.index, step = {}, active = step - 1;
+  set_bits(last, plane);
+  while (true) {
+    const Longs along_x = (x < y) & (x < z), along_y = ~(x < y) & (y < z), along_z = ~along_x & ~along_y;
+    x += along_x ? w.delta[0] : Doubles{};
+    y += along_y ? w.delta[1] : Doubles{};
+    z += along_z ? w.delta[2] : Doubles{};
+    index += (along_x & w.index_step[0]) | (along_y & w.index_step[1]) | (along_z & w.index_step[2]);
+    step += 1;
+    active &= ~((step == w.steps) & (index == w.index_end)) & ((x <= w.length) | (y <= w.length) | (z <= w.length));
+    if ((active[0] | active[1] | active[2] | active[3]) == 0) return;
+    last = active ? index : last;
+    set_bits(last, plane);
+  }
+}
+FIRSTLOOK_AVX2 void walk_four_avx2(const Walks& w, std::uint64_t* plane) { walk_four(w, plane); }
+void walk_four_portable(const Walks& w, std::uint64_t* plane) { walk_four(w, plane); }
 
 }  // namespace
 
@@ -93,6 +132,40 @@ void RayMarker::mark_passed(const Eigen::Vector3f& end_m) {
     walk<false>(w);
   else
     walk<true>(w);
+}
+
+void RayMarker::mark_all_passed(std::span<const Eigen::Vector3f> ends_m) {
+  FixedVector<Walk, kTogether> together;
+  for (const Eigen::Vector3f& end_m : ends_m) {
+    const Eigen::Vector3i end = octomap_voxel(geometry_, end_m);
+    if (end == origin_) continue;
+    if (!origin_inside_ || !well_inside(geometry_, end)) {
+      walk<true>(start(end_m, end));
+      continue;
+    }
+    together.push_back(start(end_m, end));
+    if (!together.full()) continue;
+    walk_together({together.begin(), together.size()});
+    together.clear();
+  }
+  if (!together.empty()) walk_together({together.begin(), together.size()});
+}
+
+void RayMarker::walk_together(std::span<const Walk> walks) {
+  Walks all;
+  for (std::size_t lane = 0; lane < kTogether; ++lane) {
+    const Walk& w = walks[std::min(lane, walks.size() - 1)];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      all.next[axis][lane] = w.next[axis];
+      all.delta[axis][lane] = w.delta[axis];
+      all.index_step[axis][lane] = w.index_step[axis];
+    }
+    all.length[lane] = w.length;
+    all.index[lane] = origin_index_;
+    all.index_end[lane] = w.index_end;
+    all.steps[lane] = w.steps;
+  }
+  has_avx2() ? walk_four_avx2(all, plane_.data()) : walk_four_portable(all, plane_.data());
 }
 
 bool RayMarker::passes(const Eigen::Vector3f& end_m, const Eigen::Vector3i& voxel) const {

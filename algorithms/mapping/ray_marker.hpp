@@ -20,6 +20,9 @@ class RayMarker {
   /// Marks every voxel from the origin's to the one before that of `end_m`; none when both are one voxel.
   void mark_passed(const Eigen::Vector3f& end_m);
 
+  /// The same for several ends, four rays side by side.
+  void mark_all_passed(std::span<const Eigen::Vector3f> ends_m);
+
   /// Whether mark_passed() would mark this voxel (relative to the grid); marks nothing.
   [[nodiscard]] bool passes(const Eigen::Vector3f& end_m, const Eigen::Vector3i& voxel) const;
 
@@ -39,6 +42,7 @@ class RayMarker {
   [[nodiscard]] Walk start(const Eigen::Vector3f& end_m, const Eigen::Vector3i& end) const;
   template <bool kClip>
   void walk(Walk w);
+  void walk_together(std::span<const Walk> walks);
   [[nodiscard]] std::int64_t index_of(const Eigen::Vector3i& v) const;
   [[nodiscard]] bool in_grid(std::uint64_t packed) const;
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "algorithms/kinematics/self_collision.hpp"
+#include "algorithms/mapping/log_odds_update.hpp"
 #include "platform/core/ensure.hpp"
 
 namespace firstlook {
@@ -154,13 +155,16 @@ void VoxelMap::forget_known_free() {
 }
 
 FrameChange VoxelMap::apply(std::span<const std::uint64_t> missed, std::span<const std::uint64_t> hits,
-                            const Transform<Base, Depth>& base_T_depth, double stamp_s) {
-  ENSURE(3003, missed.size() == bit_words(geometry_) && hits.size() == missed.size());
+                            const Transform<Base, Depth>& base_T_depth, double stamp_s, std::size_t first_word) {
+  ENSURE(3003, first_word + missed.size() <= bit_words(geometry_) && hits.size() == missed.size());
   const Frame frame = begin_frame(base_T_depth, stamp_s);
+  const std::size_t first = std::min(size(), first_word * 64), last = std::min(size(), first + missed.size() * 64);
+  if (!has_motion_planes()) return update_log_odds(missed, hits, std::span(log_odds_).subspan(first, last - first));
   FrameChange change;
   for (std::size_t word = 0; word < missed.size(); ++word) {
-    for_each_bit(missed[word] & ~hits[word], word * 64, [&](std::size_t index) { miss(index, frame, change); });
-    for_each_bit(hits[word], word * 64, [&](std::size_t index) { hit(index, frame, change); });
+    const std::size_t voxel = first + word * 64;
+    for_each_bit(missed[word] & ~hits[word], voxel, [&](std::size_t index) { miss(index, frame, change); });
+    for_each_bit(hits[word], voxel, [&](std::size_t index) { hit(index, frame, change); });
   }
   return change;
 }

@@ -144,10 +144,10 @@ class VoxelMap {
   [[nodiscard]] bool has_motion_planes() const { return !flags_.empty(); }
 
   /// Applies one frame: one update for each voxel, occupied before free, none at a clamp.
-  /// @param missed, hit  bit i of word i / 64 is voxel i; bit_words(geometry) words
+  /// @param missed, hit  bit i of word i / 64 is voxel 64 * first_word + i; nothing happens outside these words
   /// @param stamp_s      not negative; kept in whole seconds
   FrameChange apply(std::span<const std::uint64_t> missed, std::span<const std::uint64_t> hit,
-                    const Transform<Base, Depth>& base_T_depth, double stamp_s);
+                    const Transform<Base, Depth>& base_T_depth, double stamp_s, std::size_t first_word = 0);
   [[nodiscard]] static std::size_t bit_words(const GridGeometry& geometry) { return (geometry.count() + 63) / 64; }
 
   /// Safety rule 9: one miss for voxels that open rays of this pose and of an earlier, different one pass. Voxels that

@@ -48,7 +48,7 @@ GainModel::GainModel(const GridGeometry& geometry, const DepthSensor& sensor, co
       sampling_(sampling),
       rays_(GainRays::pinhole(sensor.intrinsics, sampling.columns, sampling.rows,
                               std::min(sensor.range_max_m, sensor.range_trusted_m))),
-      plane_(geometry.count(), kPass),
+      plane_(geometry),
       futile_(geometry) {
   frontier_.reserve(geometry.count());
   for (const Eigen::Vector3d& end : rays_.ends_m) {
@@ -58,45 +58,51 @@ GainModel::GainModel(const GridGeometry& geometry, const DepthSensor& sensor, co
 
 std::size_t GainModel::required_bytes(const GridGeometry& geometry, const GainSampling& sampling) {
   const auto rays = static_cast<std::size_t>(sampling.columns) * static_cast<std::size_t>(sampling.rows);
-  return geometry.count() * (sizeof(std::uint8_t) * 2 + sizeof(std::uint32_t)) + rays * sizeof(Eigen::Vector3d);
+  return GainPlane::required_bytes(geometry) + geometry.count() * (sizeof(std::uint8_t) + sizeof(std::uint32_t)) +
+         rays * sizeof(Eigen::Vector3d);
 }
 
 void GainModel::prepare(const ViewContext& context) {
   ENSURE(4511, context.map.geometry() == geometry_);
   ENSURE(4512, context.zone.size() == geometry_.count());
   unknown_ = 0;
-  for (std::size_t i = 0; i < plane_.size(); ++i) {
+  const std::span<std::uint8_t> plane = plane_.what();
+  for (std::size_t i = 0; i < plane.size(); ++i) {
     const bool counts = context.zone[i] != 0;
     const bool futile = futile_.count(i) >= sampling_.futile_max;
     switch (context.map.voxel_class(i)) {
       case VoxelClass::kOccupied:
-        plane_[i] = kOpaque;
+        plane[i] = kOpaque;
         break;
       case VoxelClass::kUnknown:
-        plane_[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight;
+        plane[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight;
         unknown_ += counts ? 1 : 0;
         break;
       case VoxelClass::kFree:
-        plane_[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass;
+        plane[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass;
         break;
     }
   }
+  plane_.prepare(UnknownReading::kSeeThrough);
   find_frontier(context);
   if (context.prior != nullptr) prepare_prior(context);
 }
 
 void GainModel::prepare_prior(const ViewContext& context) {
-  ENSURE(4513, prior_plane_.size() == geometry_.count() && context.prior->geometry() == geometry_);
-  for (std::size_t i = 0; i < plane_.size(); ++i) {
-    const bool expected = plane_[i] == kUnknownWeight && context.prior->voxel_class(i) == VoxelClass::kOccupied;
-    prior_plane_[i] = plane_[i] == kOpaque ? kOpaque : expected ? std::uint8_t{1} : kPass;
+  ENSURE(4513, prior_plane_ && context.prior->geometry() == geometry_);
+  const std::span<const std::uint8_t> what = plane_.what();
+  const std::span<std::uint8_t> prior = prior_plane_->what();
+  for (std::size_t i = 0; i < what.size(); ++i) {
+    const bool expected = what[i] == kUnknownWeight && context.prior->voxel_class(i) == VoxelClass::kOccupied;
+    prior[i] = what[i] == kOpaque ? kOpaque : expected ? std::uint8_t{1} : kPass;
   }
+  prior_plane_->prepare(UnknownReading::kSeeThrough);
 }
 
 void GainModel::find_frontier(const ViewContext& context) {
   frontier_.clear();
-  for (std::size_t i = 0; i < plane_.size(); ++i) {
-    if (plane_[i] != kUnknownWeight) continue;
+  for (std::size_t i = 0; i < geometry_.count(); ++i) {
+    if (plane_.what()[i] != kUnknownWeight) continue;
     const Eigen::Vector3i v = geometry_.voxel_at(i);
     for (int side = 0; side < 6; ++side) {
       Eigen::Vector3i n = v;
@@ -133,14 +139,12 @@ ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, 
   const LinkFrames frames = forward(context.arm, q_rad);
   const Transform<Base, Depth> base_T_depth = frames.flange() * context.flange_T_depth;
   const GainRays& rays = free_rays(context, frames, base_T_depth, worker);
-  const GainCount counted = count_unknown(geometry_, plane_, rays, base_T_depth, sensor_.range_min_m,
-                                          UnknownReading::kSeeThrough, worker.scratch);
+  const GainCount counted = count_unknown(plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch);
   const auto unknown = static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
   ViewGain gain{.unknown = unknown, .again = counted.voxels - unknown};
   if (context.prior != nullptr) {
-    gain.expected_surface = count_unknown(geometry_, prior_plane_, rays, base_T_depth, sensor_.range_min_m,
-                                          UnknownReading::kSeeThrough, worker.scratch)
-                                .voxels;
+    gain.expected_surface =
+        count_unknown(*prior_plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch).voxels;
   }
   return gain;
 }

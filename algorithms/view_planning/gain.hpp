@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,8 +49,8 @@ class GainModel {
   [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const GainSampling& sampling = {});
 
   /// Takes the memory that contexts with a prior map need: prior_bytes().
-  void allow_prior() { prior_plane_.assign(geometry_.count(), 0); }
-  [[nodiscard]] static std::size_t prior_bytes(const GridGeometry& geometry) { return geometry.count(); }
+  void allow_prior() { prior_plane_.emplace(geometry_); }
+  [[nodiscard]] static std::size_t prior_bytes(const GridGeometry& geometry) { return GainPlane::required_bytes(geometry); }
 
   /// Reads map, zone, free space and prior map (after allow_prior() only). Unknown voxels of the zone count; free ones
   /// that motion cannot use yet count as `again`; voxels with futile_max futile looks stop rays like occupied ones.
@@ -71,7 +72,6 @@ class GainModel {
   [[nodiscard]] std::span<const std::uint32_t> frontier() const { return frontier_; }
   /// Unknown voxels of the zone; from prepare().
   [[nodiscard]] std::size_t unknown() const { return unknown_; }
-  [[nodiscard]] std::span<const std::uint8_t> plane() const { return plane_; }
 
  private:
   /// The rays that no capsule of the body blocks; lives in the worker when some are.
@@ -86,7 +86,7 @@ class GainModel {
   GainRays rays_;
   double half_cone_rad_ = 0;  ///< the widest ray off the optical axis
   GainPlane plane_;
-  GainPlane prior_plane_;  ///< 1 where a surface is expected; empty: no prior map is allowed
+  std::optional<GainPlane> prior_plane_;  ///< 1 where a surface is expected; empty: no prior map is allowed
   std::size_t unknown_ = 0;
   std::vector<std::uint32_t> frontier_;
   FutileLooks futile_;

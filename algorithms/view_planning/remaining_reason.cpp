@@ -33,7 +33,7 @@ struct Optimist {
     for (std::size_t i = 0; i < not_occupied.size(); ++i) {
       not_occupied[i] = c.map.voxel_class(i) != VoxelClass::kOccupied && !c.map.blocked(i) ? 1 : 0;
     }
-    field.rebuild(not_occupied);
+    field.update(not_occupied);
     space.field = &field;
     const DepthSensor& sensor = gain.sensor();
     tan_x = sensor.intrinsics.width / (2 * sensor.intrinsics.fx);

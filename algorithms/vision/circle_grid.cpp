@@ -1,4 +1,4 @@
-/// The adapter to OpenCV's threshold and contours for discs: its types and exceptions end here.
+/// The adapter to OpenCV's filters and moments for discs: its types and exceptions end here.
 #include "algorithms/vision/circle_grid.hpp"
 
 #include <Eigen/Geometry>
@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "algorithms/vision/dark_outlines.hpp"
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/lattice.hpp"
 #include "algorithms/vision/marker_quads.hpp"
@@ -23,11 +24,13 @@ struct Disc {
   double radius_px = 0;  ///< of the circle with the same area
 };
 
-/// A dark ellipse from its contour; empty when the contour is none.
-std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
-  constexpr double kAreaMin_px2 = 20, kElongationMax = 3.2, kAreaOfEllipseMin = 0.85, kAreaOfEllipseMax = 1.15;
-  constexpr std::size_t kOutlineMin = 8;  // points: fewer enclose less than the least area
-  if (contour.size() < kOutlineMin) return std::nullopt;
+constexpr double kAreaMin_px2 = 20;  ///< within the outline of a disc
+
+/// A dark ellipse from its outline; empty when that is none.
+std::optional<Disc> disc_of(const Outline& outline) {
+  constexpr double kElongationMax = 3.2, kAreaOfEllipseMin = 0.85, kAreaOfEllipseMax = 1.15;
+  static_assert(sizeof(Pixel) == sizeof(cv::Point));
+  const cv::Mat contour(static_cast<int>(outline.size()), 1, CV_32SC2, const_cast<Pixel*>(outline.data()));
   const cv::Moments m = cv::moments(contour);
   if (m.m00 < kAreaMin_px2) return std::nullopt;
   const double xx = m.mu20 / m.m00, yy = m.mu02 / m.m00, xy = m.mu11 / m.m00;
@@ -40,18 +43,18 @@ std::optional<Disc> disc_of(const std::vector<cv::Point>& contour) {
   return Disc{{m.m10 / m.m00, m.m01 / m.m00}, std::sqrt(m.m00 / M_PI)};
 }
 
+/// Found with another window. A disc in the middle of the paper is not the paper, which is "round" enough, too.
+bool is_same(const Disc& a, const Disc& b) {
+  const double small_px = std::min(a.radius_px, b.radius_px), large_px = std::max(a.radius_px, b.radius_px);
+  return large_px < 2 * small_px && (a.center - b.center).norm() < small_px / 2;
+}
+
 void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
-  constexpr double kDarker = 7;  // grey levels below the mean of the window
-  cv::Mat dark;
-  cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
-  std::vector<std::vector<cv::Point>> contours;
-  std::vector<cv::Vec4i> tree;
-  cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  for (std::size_t i = 0; i < contours.size(); ++i) {
-    constexpr int kParent = 3;
-    if (tree[i][kParent] >= 0) continue;
-    const auto disc = disc_of(contours[i]);
-    const auto same = [&](const Disc& d) { return (d.center - disc->center).norm() < d.radius_px / 2; };
+  // The outline runs through the outermost pixels' centres.
+  const auto may_be = [](int width, int height) { return (width - 1) * (height - 1) >= kAreaMin_px2; };
+  for (const Outline& outline : dark_outlines({image.data, image.cols, image.rows}, window_px, may_be)) {
+    const auto disc = disc_of(outline);
+    const auto same = [&](const Disc& d) { return is_same(d, *disc); };
     if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);
   }
 }

@@ -28,6 +28,24 @@ Eigen::Vector2d apply_homography(const Eigen::Matrix3d& h, const Eigen::Vector2d
   return (h * point.homogeneous()).hnormalized();
 }
 
+std::optional<Eigen::Matrix3d> square_to_quad(double side, std::span<const Eigen::Vector2d, 4> quad) {
+  const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); };
+  const Eigen::Vector2d right = quad[1] - quad[2], left = quad[3] - quad[2];
+  const Eigen::Vector2d skew = quad[0] - quad[1] + quad[2] - quad[3];  // 0 for a parallelogram
+  const double area = cross(right, left);
+  const double scale = right.norm() * left.norm();
+  constexpr double kSineMin = 1e-9;
+  if (!std::isfinite(scale) || std::abs(area) <= kSineMin * scale) return std::nullopt;
+  const double g = cross(skew, left) / area, h = cross(right, skew) / area;
+  Eigen::Matrix3d m;
+  m.col(0) << quad[1] - quad[0] + g * quad[1], g;
+  m.col(1) << quad[3] - quad[0] + h * quad[3], h;
+  m.col(2) << quad[0], 1;
+  if (std::abs(m.determinant()) <= kSineMin * scale) return std::nullopt;
+  m.leftCols<2>() /= side;
+  return m;
+}
+
 std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector2d> from,
                                               std::span<const Eigen::Vector2d> to) {
   if (from.size() < 4 || from.size() != to.size()) return std::nullopt;

@@ -12,6 +12,10 @@ namespace firstlook {
 [[nodiscard]] std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector2d> from,
                                                             std::span<const Eigen::Vector2d> to);
 
+/// The map of a square with corners (0, 0), (side, 0), (side, side), (0, side) to these four, exactly (Heckbert 1989).
+/// Empty when three of them lie on a line.
+[[nodiscard]] std::optional<Eigen::Matrix3d> square_to_quad(double side, std::span<const Eigen::Vector2d, 4> quad);
+
 [[nodiscard]] Eigen::Vector2d apply_homography(const Eigen::Matrix3d& h, const Eigen::Vector2d& point);
 
 }  // namespace firstlook

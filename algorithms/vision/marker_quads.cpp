@@ -1,4 +1,4 @@
-/// The adapter to OpenCV's threshold, contours and polygons: its types and exceptions end here.
+/// The adapter to OpenCV's filters and polygons: its types and exceptions end here.
 #include "algorithms/vision/marker_quads.hpp"
 
 #include <Eigen/Cholesky>
@@ -10,6 +10,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <span>
+
+#include "algorithms/vision/dark_outlines.hpp"
 
 namespace firstlook {
 namespace {
@@ -33,10 +35,16 @@ bool is_same(const Quad& a, const Quad& b, double near_px) {
   return false;
 }
 
-/// The contour as a convex quadrangle, clockwise; empty when it is none.
-std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_min_px) {
-  const double perimeter = static_cast<double>(contour.size());
-  if (perimeter < 4 * side_min_px) return std::nullopt;
+/// The outline as OpenCV reads one, without a copy.
+cv::Mat as_points(const Outline& outline) {
+  static_assert(sizeof(Pixel) == sizeof(cv::Point));
+  return {static_cast<int>(outline.size()), 1, CV_32SC2, const_cast<Pixel*>(outline.data())};
+}
+
+/// The outline as a convex quadrangle, clockwise; empty when it is none.
+std::optional<Quad> quad_of(const Outline& outline, double side_min_px) {
+  if (static_cast<double>(outline.size()) < 4 * side_min_px) return std::nullopt;
+  const cv::Mat contour = as_points(outline);
   // A tenth of a side: bent or frayed sides stay one side.
   constexpr double kTolerance = 0.025;
   std::vector<cv::Point> polygon;
@@ -50,16 +58,10 @@ std::optional<Quad> quad_of(const std::vector<cv::Point>& contour, double side_m
 }
 
 void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
-  constexpr double kDarker = 7;  // grey levels below the mean of the window
-  cv::Mat dark;
-  cv::adaptiveThreshold(image, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window_px, kDarker);
-  std::vector<std::vector<cv::Point>> contours;
-  std::vector<cv::Vec4i> tree;
-  cv::findContours(dark, contours, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  for (std::size_t i = 0; i < contours.size(); ++i) {
-    constexpr int kParent = 3;
-    if (tree[i][kParent] >= 0) continue;  // the inner edge of a dark ring
-    const auto quad = quad_of(contours[i], side_min_px);
+  // No side is longer than the diagonal of the box.
+  const auto may_be = [&](int width, int height) { return std::hypot(width - 1, height - 1) >= side_min_px; };
+  for (const Outline& outline : dark_outlines({image.data, image.cols, image.rows}, window_px, may_be)) {
+    const auto quad = quad_of(outline, side_min_px);
     if (!quad) continue;
     const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
     if (std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q, near_px); })) {
@@ -100,32 +102,60 @@ struct Side {
   [[nodiscard]] Eigen::Vector2d tangent(double t) const { return along + (f[1] + 2 * t * f[2]) * outward; }
 };
 
+/// gray_between of a point at least at the first and before the last pixel's centre.
+double gray_inside(GrayImage image, const Eigen::Vector2d& px) {
+  const int u0 = static_cast<int>(px.x()), v0 = static_cast<int>(px.y());
+  const double a = px.x() - u0, b = px.y() - v0;
+  const std::uint8_t* top = &image.at(u0, v0);
+  const std::uint8_t* low = top + image.width;
+  return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * low[0] + a * low[1]);
+}
+
+bool is_inside(GrayImage image, const Eigen::Vector2d& px) {
+  return px.x() >= 0 && px.y() >= 0 && px.x() < image.width - 1 && px.y() < image.height - 1;
+}
+
 struct EdgePoint {
   double t = 0, offset = 0;
   double rise = 0;  ///< grey levels from dark to white
 };
 
+constexpr double kEdgeStep_px = 0.5;
+
+/// Sums over the rises of the grey value from sample to sample.
+struct Rises {
+  double sum = 0;     ///< grey levels
+  double moment = 0;  ///< times the steps from the first sample to the middle of each rise
+};
+
+template <typename Gray>
+Rises sum_rises(const Eigen::Vector2d& first, const Eigen::Vector2d& step, int steps, Gray gray) {
+  Rises rises;
+  double before = gray(first);
+  for (int i = 1; i <= steps; ++i) {
+    const double here = gray(first + i * step);
+    const double rise = std::max(0.0, here - before);
+    rises.sum += rise;
+    rises.moment += rise * (i - 0.5);
+    before = here;
+  }
+  return rises;
+}
+
 /// Where the grey values rise across the side at t, within `reach_px` of its present curve: the centre of the rises.
 /// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
 std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t, double reach_px) {
-  constexpr double kStep_px = 0.5;
   constexpr double kRiseMin = 8;  // grey levels, all rises together
-  const double middle = side.f[0] + t * (side.f[1] + t * side.f[2]);
-  const Eigen::Vector2d on_line = side.start + t * side.along;
-  const int steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
-  double sum = 0, moment = 0, rises = 0;
-  double before = gray_between(image, on_line + (middle - reach_px) * side.outward);
-  for (int i = 1; i <= steps; ++i) {
-    const double offset = middle - reach_px + i * kStep_px;
-    const double here = gray_between(image, on_line + offset * side.outward);
-    const double rise = std::max(0.0, here - before);
-    rises += rise;
-    sum += rise;
-    moment += rise * (offset - kStep_px / 2);
-    before = here;
-  }
-  if (rises < kRiseMin) return std::nullopt;
-  return EdgePoint{t, moment / sum, rises};
+  const int steps = static_cast<int>(2 * reach_px / kEdgeStep_px + 0.5);
+  const double from_px = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
+  const Eigen::Vector2d first = side.start + t * side.along + from_px * side.outward;
+  const Eigen::Vector2d step = kEdgeStep_px * side.outward;
+  // All samples lie between the ends: the border needs no thought where these are inside.
+  const bool inside = is_inside(image, first) && is_inside(image, first + steps * step);
+  const Rises rises = inside ? sum_rises(first, step, steps, [image](const auto& p) { return gray_inside(image, p); })
+                             : sum_rises(first, step, steps, [image](const auto& p) { return gray_between(image, p); });
+  if (rises.sum < kRiseMin) return std::nullopt;
+  return EdgePoint{t, from_px + kEdgeStep_px * rises.moment / rises.sum, rises.sum};
 }
 
 /// Least squares of degree 1 or 2, with the sum of squared residuals.

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <unordered_map>
 
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/target_pattern.hpp"
@@ -33,8 +34,7 @@ struct CellGrays {
 
 std::optional<CellGrays> read_cells(GrayImage image, const Quad& quad, int cells) {
   const double n = cells;
-  const std::array<Eigen::Vector2d, 4> square = {{{0, 0}, {n, 0}, {n, n}, {0, n}}};
-  const auto h = fit_homography(square, quad);
+  const auto h = square_to_quad(n, quad);
   if (!h) return std::nullopt;
   CellGrays result{cells, {}, 0, {}};
   for (int row = 0; row < cells; ++row) {
@@ -106,9 +106,18 @@ class CodeBook {
         code = turned_code(code, family_.bits);
       }
     }
+    for (std::size_t m = 0; m < codes_.size(); ++m) {
+      for (std::size_t turns = 0; turns < 4; ++turns) {
+        const auto [place, is_new] = exact_.try_emplace(codes_[m][turns], Reading{static_cast<int>(m), turns, 0});
+        if (!is_new) place->second.marker = -1;  // two are as near
+      }
+    }
   }
   /// The marker that differs in the fewest cells; empty when none is near enough, or two are as near.
   [[nodiscard]] std::optional<Reading> read(std::uint64_t code) const {
+    if (const auto found = exact_.find(code); found != exact_.end()) {
+      return found->second.marker >= 0 ? std::optional(found->second) : std::nullopt;
+    }
     Reading best{-1, 0, family_.correctable + 1};
     bool alone = false;
     for (std::size_t m = 0; m < codes_.size(); ++m) {
@@ -126,6 +135,7 @@ class CodeBook {
  private:
   const MarkerFamily& family_;
   std::vector<std::array<std::uint64_t, 4>> codes_;
+  std::unordered_map<std::uint64_t, Reading> exact_;
 };
 
 /// Correlation of the picture's cells with the pattern in each turn, as ARToolKit compares them; empty below its
@@ -286,19 +296,35 @@ Eigen::Vector2d square_corner(const BoardSpec& board, int column, int row, std::
   return board.square_size_m * Eigen::Vector2d(column + (k == 1 || k == 2 ? 1 : 0), row + (k >= 2 ? 1 : 0));
 }
 
+/// A marker that was found, and where it says that points near it are seen.
+struct MarkerPlane {
+  Eigen::Vector2d origin_m;   ///< the marker's first corner on the board
+  Eigen::Matrix3d px_from_m;  ///< of points seen from there
+};
+
+std::vector<MarkerPlane> planes_of(const BoardSpec& board, const std::vector<SquareMarker>& markers) {
+  std::vector<MarkerPlane> planes;
+  for (const SquareMarker& m : markers) {
+    if (const auto h = square_to_quad(board.mark_size_m, m.corners_px)) {
+      planes.push_back({board.marker_origin(m.marker), *h});
+    }
+  }
+  return planes;
+}
+
 /// Where the markers beside a black square say that its corners are seen; empty when none of them was found.
-std::optional<Quad> predicted_square(const BoardSpec& board, const std::vector<SquareMarker>& markers, int column,
+std::optional<Quad> predicted_square(const BoardSpec& board, const std::vector<MarkerPlane>& planes, int column,
                                      int row) {
   Quad sum{};
   for (auto& corner : sum) corner.setZero();
   int count = 0;
-  const Eigen::Vector2d middle = board.square_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
-  for (const SquareMarker& m : markers) {
-    const Eigen::Vector2d at = board.marker_origin(m.marker).array() + board.mark_size_m / 2;
-    if ((at - middle).norm() > 1.1 * board.square_size_m) continue;
-    const auto h = homography_of(board, {m});
-    if (!h) continue;
-    for (std::size_t k = 0; k < 4; ++k) sum[k] += apply_homography(*h, square_corner(board, column, row, k));
+  const Eigen::Vector2d middle_m = board.square_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+  for (const MarkerPlane& plane : planes) {
+    const Eigen::Vector2d marker_m = plane.origin_m.array() + board.mark_size_m / 2;
+    if ((marker_m - middle_m).norm() > 1.1 * board.square_size_m) continue;
+    for (std::size_t k = 0; k < 4; ++k) {
+      sum[k] += apply_homography(plane.px_from_m, square_corner(board, column, row, k) - plane.origin_m);
+    }
     ++count;
   }
   if (count == 0) return std::nullopt;
@@ -311,12 +337,13 @@ std::optional<Quad> predicted_square(const BoardSpec& board, const std::vector<S
 /// off, opencv#25539).
 Result<CornerSet> charuco_corners(GrayImage image, const BoardSpec& board, const std::vector<SquareMarker>& markers) {
   constexpr double kAgreement_px = 1.0;
+  const std::vector<MarkerPlane> planes = planes_of(board, markers);
   std::vector<std::vector<Eigen::Vector2d>> seen(static_cast<std::size_t>(board.corners()));
   for (int row = -1; row < board.inner_rows; ++row) {
     for (int column = -1; column < board.inner_columns; ++column) {
       const Eigen::Vector2d middle = board.square_size_m * Eigen::Vector2d(column + 0.5, row + 0.02);
       if (!is_dark(board, middle.x(), middle.y())) continue;
-      auto square = predicted_square(board, markers, column, row);
+      auto square = predicted_square(board, planes, column, row);
       if (!square) continue;
       const Quad start = *square;
       const double side = side_px(start);

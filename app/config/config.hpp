@@ -122,6 +122,7 @@ struct Config {
     double baseline_m = 0.075;       ///< to the projector or second camera
     double crop_m = 0;               ///< returns beyond it are left out; 0: none is
     double filter_voxel_m = 0;       ///< of returns in one cube of this edge one is kept; 0: all are
+    int plane_fit_px = 0;            ///< window of the plane fit before insertion; 0: there is none
     /// Standard deviation of a depth.
     [[nodiscard]] double sigma_m(double z_m) const { return std::hypot(noise_floor_m, noise_at_1m_m * z_m * z_m); }
     bool operator==(const Depth&) const = default;
@@ -138,7 +139,9 @@ struct Config {
     double fine_resolution_m = 0;     ///< of a finer map of a part of the cell; 0: there is none
     std::array<double, 3> fine_low_m{};
     std::array<double, 3> fine_high_m{};
-    std::string prior = "none";  ///< .bt or .ot of an earlier map of the cell; none: there is none
+    double ground_height_m = 0;     ///< of a level floor that clears only
+    double ground_tolerance_m = 0;  ///< 0: the floor is mapped as anything else
+    std::string prior = "none";     ///< .bt or .ot of an earlier map of the cell; none: there is none
     bool operator==(const Map&) const = default;
   } map;
 

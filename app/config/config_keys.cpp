@@ -243,6 +243,13 @@ void add_depth_keys(Keys& keys, Config& c) {
                   0.2,
                   {},
                   "of the returns that end in one cube of this side one is used; 0: all are"});
+  keys.push_back({"depth.plane_fit_px",
+                  &c.depth.plane_fit_px,
+                  0,
+                  31,
+                  {},
+                  "side of a window (odd); where its returns lie on a plane within the noise, that plane is mapped; 0: "
+                  "off"});
 }
 
 void add_map_keys(Keys& keys, Config& c) {
@@ -271,6 +278,15 @@ void add_map_keys(Keys& keys, Config& c) {
   keys.push_back({"map.holes", &c.map.holes, 0, 0, kHoles,
                   "what a pixel without a return says. ignore: nothing; clear_when_corroborated: free space, where two "
                   "poses agree, the near part is known free and no return is near it"});
+  keys.push_back({"map.ground_height_m", &c.map.ground_height_m, -5, 5, {}, "of a level floor in base"});
+  keys.push_back(
+      {"map.ground_tolerance_m",
+       &c.map.ground_tolerance_m,
+       0,
+       0.5,
+       {},
+       "returns this near to the floor clear the way there and mark nothing, and nothing moves below its top; "
+       "0: the floor is mapped as all else"});
   keys.push_back({"map.fine_resolution_m",
                   &c.map.fine_resolution_m,
                   0,
@@ -408,6 +424,9 @@ std::string broken_rule(const Config& c) {
   if (c.depth.crop_m > 0 && c.depth.crop_m <= c.depth.range_min_m) return "depth.crop_m must exceed depth.range_min_m";
   if (c.depth.filter_voxel_m > 0 && c.depth.filter_voxel_m < 0.005) {
     return "depth.filter_voxel_m must be 0 or at least 0.005";
+  }
+  if (c.depth.plane_fit_px != 0 && (c.depth.plane_fit_px < 3 || c.depth.plane_fit_px % 2 == 0)) {
+    return "depth.plane_fit_px must be 0 or an odd number from 3";
   }
   if (c.depth.range_min_m >= c.depth.range_trusted_m) return "depth.range_min_m must be below depth.range_trusted_m";
   if (c.depth.range_trusted_m > c.depth.range_max_m) return "depth.range_trusted_m must not exceed depth.range_max_m";

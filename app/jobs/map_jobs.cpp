@@ -64,6 +64,7 @@ std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
                     self_depth_.items());
   const DepthImage depth{{pixels.data, pixels.width, pixels.height}, units_per_m};
   if (open_rays_) open_rays_->look(depth, self_depth_.items());
+  if (plane_fit_) pixels_fitted_ += plane_fit_->apply(pixels, units_per_m);
   if (filter_) {
     const DepthFilterResult left_out = filter_->apply(pixels, units_per_m, base_T_depth);
     pixels_left_out_ += left_out.pixels_cropped + left_out.pixels_thinned;

@@ -42,6 +42,12 @@ std::size_t fine_map_bytes(const Config& config) {
 
 DepthFilterOptions filter_of(const Config& config) { return {config.depth.crop_m, config.depth.filter_voxel_m}; }
 
+PlaneFitOptions plane_fit_of(const Config& config) {
+  return {config.depth.plane_fit_px, config.depth.noise_floor_m, config.depth.noise_at_1m_m};
+}
+
+GroundPlane ground_of(const Config& config) { return {config.map.ground_height_m, config.map.ground_tolerance_m}; }
+
 ClearanceInputs clearance_inputs(const Config& config) {
   ClearanceInputs in;
   in.voxel_m = config.map.resolution_m;
@@ -146,9 +152,16 @@ void Workbench::take_options() {
   holes_record_.policy = config_.map.holes;
   if (config_.map.holes != "ignore") open_rays_.emplace(g, sensor);
   if (filter_of(config_).is_on()) filter_.emplace(g, sensor, filter_of(config_));
+  if (plane_fit_of(config_).is_on()) plane_fit_.emplace(sensor.intrinsics, plane_fit_of(config_));
+  const GroundPlane ground = ground_of(config_);
+  if (ground.tolerance_m > 0) {
+    inserter_.set_ground(ground);
+    map_.block(HalfSpace{-Eigen::Vector3d::UnitZ(), -ground.top_m()});
+  }
   if (config_.map.fine_resolution_m == 0) return;
   fine_map_.emplace(fine_geometry(config_), VoxelMap::Planes::kLogOddsOnly);
   fine_inserter_.emplace(fine_map_->geometry(), sensor);
+  if (ground.tolerance_m > 0) fine_inserter_->set_ground(ground);
 }
 
 Status Workbench::take_memory() {
@@ -162,6 +175,7 @@ Status Workbench::take_memory() {
   const DepthSensor& sensor = inserter_.sensor();
   const std::size_t options = (open_rays_ ? OpenRays::required_bytes(g, sensor) : 0) +
                               (filter_ ? DepthFilter::required_bytes(g, sensor, filter_of(config_)) : 0) +
+                              PlaneFit::required_bytes(sensor.intrinsics, plane_fit_of(config_)) +
                               (fine_map_ ? Inserter::required_bytes(fine_map_->geometry(), sensor) : 0);
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
@@ -280,7 +294,7 @@ VoxelCounts Workbench::zone_counts() const {
 void Workbench::rebuild_free_space(double now_s) {
   if (mapping_terms_) revoke_zone();
   map_.free_mask(now_s, config_.map.free_max_age_s, free_mask_);
-  field_.rebuild(free_mask_);
+  field_.update(free_mask_);
   if (!mapping_terms_) return;
   mapping_space_ = space_of(MotionPhase::kMapping);
   for (std::size_t i = 0; i < free_mask_.size(); ++i) {
@@ -315,7 +329,7 @@ void Workbench::revoke_zone() {
     free_mask_[i] = taken ? 0 : 1;
     any_revoked_ = any_revoked_ || taken;
   }
-  if (any_revoked_) revoked_field_.rebuild(free_mask_);
+  if (any_revoked_) revoked_field_.update(free_mask_);
 }
 
 ViewContext Workbench::context(const Clearance& clearance) const {

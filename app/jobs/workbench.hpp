@@ -17,6 +17,7 @@
 #include "algorithms/mapping/insertion.hpp"
 #include "algorithms/mapping/map_change.hpp"
 #include "algorithms/mapping/open_rays.hpp"
+#include "algorithms/mapping/plane_fit.hpp"
 #include "algorithms/motion/body.hpp"
 #include "algorithms/motion/clearance.hpp"
 #include "algorithms/motion/planner.hpp"
@@ -147,6 +148,7 @@ class Workbench {
   [[nodiscard]] const HolesRecord& holes() const { return holes_record_; }
   [[nodiscard]] std::uint64_t occupied_forgotten() const { return occupied_forgotten_; }
   [[nodiscard]] std::uint64_t pixels_left_out() const { return pixels_left_out_; }
+  [[nodiscard]] std::uint64_t pixels_fitted() const { return pixels_fitted_; }
   /// Where the camera stood at each of `mapping_views()`; the outermost corners of each board. For pictures.
   [[nodiscard]] std::vector<CameraPlace> camera_places() const;
   [[nodiscard]] std::vector<std::array<Eigen::Vector3d, 4>> board_outlines_m() const;
@@ -311,6 +313,7 @@ class Workbench {
   FrameGate gate_;
   std::optional<OpenRays> open_rays_;  ///< with map.holes: clear_when_corroborated
   std::optional<DepthFilter> filter_;  ///< with depth.crop_m or depth.filter_voxel_m
+  std::optional<PlaneFit> plane_fit_;  ///< with depth.plane_fit_px
   std::optional<VoxelMap> fine_map_;   ///< with map.fine_resolution_m
   std::optional<Inserter> fine_inserter_;
   DistanceField field_;
@@ -334,6 +337,7 @@ class Workbench {
   HolesRecord holes_record_;
   std::uint64_t occupied_forgotten_ = 0;
   std::uint64_t pixels_left_out_ = 0;
+  std::uint64_t pixels_fitted_ = 0;
   std::uint64_t unknown_before_ = 0;   ///< the last frame
   std::uint64_t unknown_at_view_ = 0;  ///< after the last view
   std::vector<MappingViewRecord> mapping_views_;

@@ -158,6 +158,10 @@ std::string map_section(const RunRecord& record) {
     body += fmt::format("<p class=\"hint\">{} returns were left out by range crop and voxel filter.</p>\n",
                         grouped(m.pixels_left_out));
   }
+  if (m.pixels_fitted > 0) {
+    body += fmt::format("<p class=\"hint\">{} returns were moved onto the plane of their neighbours.</p>\n",
+                        grouped(m.pixels_fitted));
+  }
   if (m.fine) {
     body += fmt::format(
         "<p class=\"hint\">Finer map of a part, <code>fine_map.bt</code>, voxels of {:.0f} mm: {} free, {} occupied, "

@@ -46,7 +46,8 @@ Json mapping_json(const MappingRecord& mapping) {
             {"dropped", mapping.frames_dropped()},
             {"refused", refused},
             {"infinite_pixels", mapping.infinite_pixels},
-            {"pixels_left_out", mapping.pixels_left_out}}},
+            {"pixels_left_out", mapping.pixels_left_out},
+            {"pixels_fitted", mapping.pixels_fitted}}},
           {"fine", mapping.fine ? Json{{"resolution_m", mapping.fine->resolution_m},
                                        {"voxels", counts_json(mapping.fine->voxels)}}
                                 : Json(nullptr)},

@@ -156,6 +156,7 @@ struct MappingRecord {
   FlawCounts frames_refused{};        ///< by FrameFlaw
   std::uint64_t infinite_pixels = 0;  ///< of the largest value: taken for no return
   std::uint64_t pixels_left_out = 0;  ///< by depth.crop_m and depth.filter_voxel_m
+  std::uint64_t pixels_fitted = 0;    ///< by depth.plane_fit_px
   HolesRecord holes;
   std::uint64_t occupied_forgotten = 0;  ///< occupied voxels that became unknown by age (map.occupied_max_age_s)
   [[nodiscard]] std::uint64_t frames_dropped() const {

@@ -246,6 +246,7 @@ MappingRecord Cart::mapping_record() const {
   m.frames_refused[static_cast<std::size_t>(FrameFlaw::kPoseUnknown)] = machine_->depth_frames_unposed();
   m.infinite_pixels = bench_->infinite_pixels();
   m.pixels_left_out = bench_->pixels_left_out();
+  m.pixels_fitted = bench_->pixels_fitted();
   m.holes = bench_->holes();
   if (const VoxelMap* fine = bench_->fine_map()) m.fine = FineMapRecord{fine->geometry().resolution_m, fine->counts()};
   m.occupied_forgotten = bench_->occupied_forgotten();

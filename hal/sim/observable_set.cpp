@@ -81,7 +81,7 @@ class Fixpoint {
     bool grown = false;
     while (result.rounds < kRoundsMax) {
       ++result.rounds;
-      field_.rebuild(free_);
+      field_.update(free_);
       const int before = reached_count();
       reach_all();
       const bool news = look_from_reached();

@@ -11,10 +11,23 @@
 
 namespace firstlook {
 
+/// While one of these lives every has_avx2() says no: for tests that hold both ways against each other.
+class PortableOnly {
+ public:
+  PortableOnly() { ++count_; }
+  ~PortableOnly() { --count_; }
+  PortableOnly(const PortableOnly&) = delete;
+  PortableOnly& operator=(const PortableOnly&) = delete;
+  [[nodiscard]] static bool any() { return count_ > 0; }
+
+ private:
+  static inline int count_ = 0;
+};
+
 /// Whether functions marked FIRSTLOOK_AVX2 may be called.
 [[nodiscard]] inline bool has_avx2() {
 #if defined(__x86_64__)
-  return __builtin_cpu_supports("avx2") > 0;
+  return !PortableOnly::any() && __builtin_cpu_supports("avx2") > 0;
 #else
   return false;
 #endif

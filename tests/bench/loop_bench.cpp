@@ -43,7 +43,7 @@ struct OpenSpace {
   OpenSpace() {
     std::vector<std::uint8_t> free(geometry.count());
     for (std::size_t i = 0; i < free.size(); ++i) free[i] = geometry.center_m(geometry.voxel_at(i)).z() > -0.2 ? 1 : 0;
-    field.rebuild(free);
+    field.update(free);
     FreeSpace space;
     space.field = &field;
     published.publish(space, body_with_camera(arm, Transform<Flange, Camera>()), Clearance{0.05, 0.01}, free);

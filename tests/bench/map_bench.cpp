@@ -23,13 +23,13 @@ struct Resolution {
   const char* name;
   double m;
   int frames_smoke, frames, frames_thorough;
-  double insert_ratio_min;     ///< how many times OctoMap's speed
-  double differing_share_max;  ///< of the known voxels: classes that differ, near ties apart
+  double full_ratio_min, discretized_ratio_min;  ///< how many times OctoMap's speed
+  double differing_share_max;                    ///< of the known voxels: classes that differ, near ties apart
 };
 constexpr Resolution kResolutions[] = {
-    {"5cm", 0.05, 2, 30, 30, 100, 0},
-    {"2cm", 0.02, 1, 12, 30, 100, 0},
-    {"1cm", 0.01, 0, 3, 12, 80, 1e-6},
+    {"5cm", 0.05, 2, 30, 30, 100, 6, 0},
+    {"2cm", 0.02, 1, 12, 30, 100, 25, 0},
+    {"1cm", 0.01, 0, 3, 12, 80, 30, 1e-6},
 };
 
 struct Distance {
@@ -43,12 +43,18 @@ struct InsertionRun {
   std::vector<double> ours_s, peer_s;
   Agreement agreement;
   std::size_t known_here = 0;
+
+  /// Missing, additional and differing voxels alike; near ties apart.
+  [[nodiscard]] std::size_t differing() const {
+    const std::size_t there = agreement.known_there + agreement.outside;
+    return agreement.class_differs + agreement.outside + std::max(there, known_here) - std::min(there, known_here);
+  }
 };
 
-InsertionRun insert_all(const DepthFrames& frames, double resolution_m) {
+InsertionRun insert_all(const DepthFrames& frames, double resolution_m, RayEnds ends) {
   const GridGeometry geometry = grid_around(frames, resolution_m);
   VoxelMap map(geometry, VoxelMap::Planes::kLogOddsOnly);  // all that OctoMap keeps, too
-  Inserter inserter(geometry, frames.sensor);
+  Inserter inserter(geometry, frames.sensor, ends);
   octomap::OcTree tree(resolution_m);
   InsertionRun run;
   for (std::size_t i = 0; i < frames.frames.size(); ++i) {
@@ -61,8 +67,9 @@ InsertionRun insert_all(const DepthFrames& frames, double resolution_m) {
     // The peer's cloud is made beforehand; ours starts from the depth values.
     const octomap::Pointcloud cloud = cloud_of(image, frames.sensor.intrinsics, frame.base_T_depth);
     const octomap::point3d origin = to_octomap(frame.base_T_depth.translation());
+    const bool discretize = ends == RayEnds::kVoxelCenters;
     run.peer_s.push_back(
-        seconds_of([&] { tree.insertPointCloud(cloud, origin, frames.sensor.range_max_m, false, false); }));
+        seconds_of([&] { tree.insertPointCloud(cloud, origin, frames.sensor.range_max_m, false, discretize); }));
   }
   run.agreement = compare(map, tree);
   const VoxelCounts counts = map.counts();
@@ -70,9 +77,36 @@ InsertionRun insert_all(const DepthFrames& frames, double resolution_m) {
   return run;
 }
 
+struct InsertionMode {
+  const char* name;
+  const char* peer;
+  RayEnds ends;
+};
+constexpr InsertionMode kModes[] = {{"full", "insertPointCloud", RayEnds::kPixels},
+                                    {"discretized", "insertPointCloud, discretized", RayEnds::kVoxelCenters}};
+
+void report_insertion(const InsertionRun& run, const InsertionMode& mode, const std::string& where, double ratio_min,
+                      double share_max, Report& report) {
+  const auto known = static_cast<double>(run.agreement.known_there);
+  const auto differing = static_cast<double>(run.differing());
+  const char* void_because = differing <= share_max * known ? "" : "results differ";
+  Row time = timed(fmt::format("map/insert/{}/{}", mode.name, where), 1e3 * median(run.ours_s), "ms", mode.peer,
+                   1e3 * median(run.peer_s), Goal::ratio_at_least(ratio_min));
+  time.void_because = void_because;
+  report.add(time);
+  Row same = measured(fmt::format("map/differing_voxels/{}/{}", mode.name, where), differing, "voxels",
+                      fmt::format("OctoMap's {} voxels", known), known, Goal::ratio_at_most(share_max));
+  same.void_because = void_because;
+  report.add(same);
+  report.add(measured(fmt::format("map/near_ties/{}/{}", mode.name, where),
+                      static_cast<double>(run.agreement.near_ties), "voxels", fmt::format("OctoMap's {} voxels", known),
+                      known, Goal::none()));
+}
+
 void bench_insertion(const Options& options, Report& report) {
+  const bool recorded = !options.dataset.empty();
   for (const Distance& distance : kDistances) {
-    if (!options.dataset.empty() && distance.suffix[0] != '\0') continue;
+    if (recorded && distance.suffix[0] != '\0') continue;
     const int frames_max = options.amount(2, 30, 30);
     const DepthFrames all = depth_frames(options, {distance.mean_depth_m, frames_max});
     for (const Resolution& resolution : kResolutions) {
@@ -80,24 +114,14 @@ void bench_insertion(const Options& options, Report& report) {
       if (count == 0) continue;
       DepthFrames frames = all;
       frames.frames.resize(std::min(frames.frames.size(), static_cast<std::size_t>(count)));
-      const InsertionRun run = insert_all(frames, resolution.m);
-      const Agreement& a = run.agreement;
-      // Missing, additional and differing voxels alike.
-      const std::size_t known_elsewhere =
-          std::max(a.known_there + a.outside, run.known_here) - std::min(a.known_there + a.outside, run.known_here);
-      const auto differing = static_cast<double>(a.class_differs + a.outside + known_elsewhere);
-      const double share_max = resolution.differing_share_max;
-      const char* void_because = differing <= share_max * static_cast<double>(a.known_there) ? "" : "results differ";
-      Row time = timed(fmt::format("map/insert/full/{}{}", resolution.name, distance.suffix), 1e3 * median(run.ours_s),
-                       "ms", "OctoMap insertPointCloud", 1e3 * median(run.peer_s),
-                       Goal::ratio_at_least(resolution.insert_ratio_min));
-      time.void_because = void_because;
-      report.add(time);
-      Row same = measured(fmt::format("map/differing_voxels/{}{}", resolution.name, distance.suffix), differing,
-                          "voxels", fmt::format("OctoMap's {} voxels", a.known_there),
-                          static_cast<double>(a.known_there), Goal::ratio_at_most(share_max));
-      same.void_because = void_because;
-      report.add(same);
+      for (const InsertionMode& mode : kModes) {
+        const bool full = mode.ends == RayEnds::kPixels;
+        if (!full && distance.suffix[0] != '\0') continue;
+        report_insertion(insert_all(frames, resolution.m, mode.ends), mode,
+                         fmt::format("{}{}", resolution.name, distance.suffix),
+                         full ? resolution.full_ratio_min : resolution.discretized_ratio_min,
+                         recorded ? 0 : resolution.differing_share_max, report);
+      }
     }
   }
 }
@@ -172,24 +196,24 @@ double largest_difference_m(const DistanceField& ours, const DynamicField& peer)
 #endif
 
 /// What one frame changes in the free space, and the field after it.
-void bench_distance_field(const Options& options, Report& report, const DepthFrames& frames) {
+void bench_distance_field(Report& report, const DepthFrames& frames) {
   const GridGeometry geometry = job_grid(0.05);
   VoxelMap map(geometry, VoxelMap::Planes::kLogOddsOnly);
   Inserter inserter(geometry, frames.sensor);
   DistanceField field(geometry, kFieldMax_m);
-  std::vector<double> ours_s, peer_s;
+  std::vector<double> ours_s, whole_s, peer_s;
   double difference_m = 0;
 #ifdef BENCH_HAS_DYNAMICEDT3D
   DynamicField peer(geometry, kFieldMax_m);
 #endif
-  const int rounds = options.amount(1, 5, 20);
   for (std::size_t i = 0; i < frames.frames.size(); ++i) {
     const DepthFrame& frame = frames.frames[i];
     if (!inserter.insert(map, frames.image(frame), frame.base_T_depth, {}, static_cast<double>(i))) std::abort();
     const std::vector<std::uint8_t> free = free_voxels(map);
-    std::vector<double> repeats;
-    for (int round = 0; round < rounds; ++round) repeats.push_back(seconds_of([&] { field.rebuild(free); }));
-    ours_s.push_back(median(repeats));
+    ours_s.push_back(seconds_of([&] { field.update(free); }));
+    DistanceField whole(geometry, kFieldMax_m);
+    whole_s.push_back(seconds_of([&] { whole.update(free); }));
+    if (!std::equal(whole.values().begin(), whole.values().end(), field.values().begin())) difference_m = 1;
 #ifdef BENCH_HAS_DYNAMICEDT3D
     peer_s.push_back(peer.update(free));
     difference_m = std::max(difference_m, largest_difference_m(field, peer));
@@ -198,8 +222,11 @@ void bench_distance_field(const Options& options, Report& report, const DepthFra
   const std::optional<double> peer_ms = peer_s.empty() ? std::nullopt : std::optional(1e3 * median(peer_s));
   Row row = timed("map/distance_field/5cm", 1e3 * median(ours_s), "ms", "dynamicEDT3D update", peer_ms,
                   Goal::ours_at_most(2));
-  if (difference_m > 1e-4) row.void_because = "results differ";  // floats of a root
-  report.add(row);
+  Row whole = timed("map/distance_field/5cm/whole", 1e3 * median(whole_s), "ms", "", std::nullopt, Goal::none());
+  for (Row* one : {&row, &whole}) {
+    if (difference_m > 1e-4) one->void_because = "results differ";  // floats of a root
+    report.add(*one);
+  }
 }
 
 /// All that the job does with a frame: self filter, insertion with the planes for motion, free space, field.
@@ -225,7 +252,7 @@ void bench_frame(Report& report, const DepthFrames& frames) {
       render_self_depth({placed.data(), placed.size()}, 0.02, frame.base_T_depth, sensor.intrinsics, self_m);
       if (!inserter.insert(map, frames.image(frame), frame.base_T_depth, self_m, now_s)) std::abort();
       map.free_mask(now_s, 600, free);
-      field.rebuild(free);
+      field.update(free);
     }));
   }
   report.add(timed("map/frame/5cm", 1e3 * median(seconds), "ms", "", std::nullopt, Goal::none()));
@@ -236,7 +263,7 @@ void bench_frame(Report& report, const DepthFrames& frames) {
 void bench_map(const Options& options, Report& report) {
   bench_insertion(options, report);
   const DepthFrames frames = depth_frames(options, {1.7, options.amount(3, 20, 30)});
-  bench_distance_field(options, report, frames);
+  bench_distance_field(report, frames);
   bench_frame(report, frames);
 }
 

@@ -32,7 +32,7 @@ MotionCell::MotionCell(std::uint64_t seed, double resolution_m)
   const sim::Scene scene = scene_of(seed);
   free = sim::occupied_voxels(scene, geometry);
   for (std::uint8_t& voxel : free) voxel = voxel == 0 ? 1 : 0;
-  field.rebuild(free);
+  field.update(free);
   body = body_with_camera(arm, scene.mount.flange_T_camera());
   clearance = required_clearance({.voxel_m = resolution_m}).clearance();
   space.field = &field;

@@ -97,7 +97,7 @@ class MappedWorkshop {
     render_self_depth({padded.data(), padded.size()}, 0.02, base_T_depth, c, self_m);
     if (!inserter_.insert(map_, {{values.data(), c.width, c.height}, 1000}, base_T_depth, self_m, now_s_)) std::abort();
     map_.free_mask(now_s_, kFreeMaxAge_s, free_);
-    field_.rebuild(free_);
+    field_.update(free_);
     space_.field = &field_;
   }
 

@@ -57,4 +57,15 @@ TEST_CASE("options of the map are off by default and do what they say", "[scenar
   CHECK(fine["free"].get<int>() > 10000);
 }
 
+TEST_CASE("the plane fit and a ground that clears only", "[scenario]") {
+  // The empty cell's floor is 0.85 m below the base.
+  const std::string extents = "low_m: [-1.5, -1.5, -1.0]";
+  const Json plain = run_with("map: {" + extents + "}\n");
+  const Json fitted =
+      run_with("depth: {plane_fit_px: 7}\nmap: {" + extents + ", ground_height_m: -0.85, ground_tolerance_m: 0.06}\n");
+  CHECK(plain["mapping"]["frames"]["pixels_fitted"] == 0);
+  CHECK(fitted["mapping"]["frames"]["pixels_fitted"].get<int>() > 100000);
+  CHECK(fitted["mapping"]["voxels"]["occupied"].get<int>() < plain["mapping"]["voxels"]["occupied"].get<int>() / 2);
+}
+
 }  // namespace firstlook

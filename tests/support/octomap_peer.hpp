@@ -33,9 +33,9 @@ inline octomap::Pointcloud cloud_of(const DepthImage& depth, const CameraIntrins
 
 /// Inserts the returns of an undistorted frame.
 inline void insert_into(octomap::OcTree& tree, const DepthImage& depth, const CameraIntrinsics& c,
-                        const Transform<Base, Depth>& base_T_depth, double range_max_m) {
+                        const Transform<Base, Depth>& base_T_depth, double range_max_m, bool discretize = false) {
   tree.insertPointCloud(cloud_of(depth, c, base_T_depth), to_octomap(base_T_depth.translation()), range_max_m, false,
-                        false);
+                        discretize);
 }
 
 struct Agreement {

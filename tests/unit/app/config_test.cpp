@@ -73,9 +73,9 @@ Config all_changed() {
                    11,
                    "runs/first: one/hand_eye.yaml",
                    4};
-  c.depth = {"stereo", 0.4, 6, 3.5, 0.001, 0.003, 0.06, 4, 0.03};
-  c.map = {0.02,           {-1, -1, 0},     {1, 1, 1},       60, 30, 0.002, "clear_when_corroborated", 0.01,
-           {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, "earlier/map.ot"};
+  c.depth = {"stereo", 0.4, 6, 3.5, 0.001, 0.003, 0.06, 4, 0.03, 5};
+  c.map = {0.02, {-1, -1, 0},    {1, 1, 1},       60,   30,   0.002,           "clear_when_corroborated",
+           0.01, {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, -0.8, 0.03, "earlier/map.ot"};
   c.explore = {61, 401, 2001, 9, 3};
   c.clearance = {0.001, 0.002, 0.03, 4};
   c.memory = {512};
@@ -166,6 +166,8 @@ TEST_CASE("rules between keys hold", "[config]") {
   CHECK_THAT(refused("depth: {range_max_m: 2}", Fault::kConfigBadValue), Contains("range_max_m"));
   CHECK_THAT(refused("depth: {crop_m: 0.4}", Fault::kConfigBadValue), Contains("crop_m"));
   CHECK_THAT(refused("depth: {filter_voxel_m: 0.001}", Fault::kConfigBadValue), Contains("filter_voxel_m"));
+  CHECK_THAT(refused("depth: {plane_fit_px: 4}", Fault::kConfigBadValue), Contains("plane_fit_px"));
+  CHECK_THAT(refused("map: {ground_tolerance_m: -0.1}", Fault::kConfigBadValue), Contains("ground_tolerance_m"));
   CHECK_THAT(refused("map: {fine_resolution_m: 0.05}", Fault::kConfigBadValue), Contains("fine_resolution_m"));
   CHECK_THAT(refused("map: {fine_resolution_m: 0.01}", Fault::kConfigBadValue), Contains("one fine voxel"));
   CHECK_THAT(

@@ -9,31 +9,17 @@
 #include "algorithms/calibration/verdict.hpp"
 #include "app/cli/calibrate_command.hpp"
 #include "app/dataset/calibration_dataset.hpp"
+#include "tests/support/recorded_data.hpp"
 #include "tests/unit/calibration/synthetic_views.hpp"
 #include "tests/unit/vision/draw_board.hpp"
 
 using namespace firstlook;
 using Catch::Matchers::Contains;
+using test::DataFolder;
 using test::Setup;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Folder {
-  fs::path path;
-  explicit Folder(const std::string& name) : path(fs::temp_directory_path() / ("firstlook_targets_" + name)) {
-    fs::remove_all(path);
-    fs::create_directories(path);
-  }
-  ~Folder() { fs::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  void write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
-  [[nodiscard]] std::string read(const std::string& name) const {
-    std::ifstream stream(path / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
-};
 
 const std::string kDoor =
     "  - name: door\n    type: checkerboard\n    inner_columns: 8\n    inner_rows: 6\n    square_size_m: 0.03\n";
@@ -49,29 +35,15 @@ struct Cell {
   }
 };
 
-std::string pose_row(const std::string& image, const Pose& pose) {
-  const Eigen::Quaterniond q(pose.linear());
-  const Eigen::Vector3d t = pose.translation();
-  return fmt::format("{},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g}\n", image, t.x(), t.y(), t.z(), q.x(),
-                     q.y(), q.z(), q.w());
-}
-
-std::string camera_yaml(const CameraIntrinsics& c) {
-  return fmt::format(
-      "image_width: {}\nimage_height: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}, 0, {}, 0, {}, {}, 0, 0, 1]}}\n"
-      "distortion_model: plumb_bob\ndistortion_coefficients: {{rows: 1, cols: 5, data: [{}, {}, {}, {}, {}]}}\n",
-      c.width, c.height, c.fx, c.cx, c.fy, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3);
-}
-
 /// Every third picture shows both, the others one of the two. Corners outside the image are not written, so that a
 /// checkerboard that is not whole is left out.
-void write_cell(const Folder& folder, const Cell& cell, int pictures) {
+void write_cell(const DataFolder& folder, const Cell& cell, int pictures) {
   Random random(71);
-  std::string poses = "image,x,y,z,qx,qy,qz,qw\n", corners = "target,image,point,u_px,v_px\n";
+  std::string poses = test::kPosesHeader, corners = "target,image,point,u_px,v_px\n";
   for (int i = 0; i < pictures; ++i) {
     const Setup& looked_at = i % 3 == 1 ? cell.table : cell.door;
     const Pose flange = test::flange_for(looked_at, test::random_camera_T_board(looked_at, random));
-    poses += pose_row(fmt::format("{}.png", i), flange);
+    poses += fmt::format("{}.png,{}\n", i, test::numbers(flange));
     for (const auto& [name, setup] : {std::pair{"door", &cell.door}, {"table", &cell.table}}) {
       if (i % 3 != 2 && setup != &looked_at) continue;
       const CalibrationView view = test::observe(*setup, flange, random);
@@ -83,13 +55,13 @@ void write_cell(const Folder& folder, const Cell& cell, int pictures) {
     }
   }
   folder.write("board.yaml", "boards:\n" + kDoor + kTable);
-  folder.write("camera_info.yaml", camera_yaml(cell.door.camera));
+  folder.write("camera_info.yaml", test::camera_yaml(cell.door.camera));
   folder.write("poses.csv", poses);
   folder.write("corners.csv", corners);
 }
 
-void check_refused(const Folder& folder, const std::string& words) {
-  const auto data = read_calibration_dataset(folder.path);
+void check_refused(const DataFolder& folder, const std::string& words) {
+  const auto data = read_calibration_dataset(folder.path());
   REQUIRE_FALSE(data);
   CHECK(data.error().fault == Fault::kDataMalformed);
   CHECK_THAT(std::string(data.error().detail()), Contains(words));
@@ -108,9 +80,9 @@ void write_png(const fs::path& file, const test::DrawnImage& image) {
 
 TEST_CASE("corners of two targets in any subset are read and solved together", "[app][calibration]") {
   const Cell cell;
-  const Folder folder("corners");
+  const DataFolder folder;
   write_cell(folder, cell, 18);
-  const auto data = read_calibration_dataset(folder.path);
+  const auto data = read_calibration_dataset(folder.path());
   if (!data) FAIL(data.error().detail());
   REQUIRE(data->targets.size() == 2);
   CHECK(data->targets[1].name == "table");
@@ -141,13 +113,13 @@ TEST_CASE("corners of two targets in any subset are read and solved together", "
 }
 
 TEST_CASE("calibrate --out writes a page and figures of several targets, the same each time", "[app][calibration]") {
-  const Folder folder("out");
+  const DataFolder folder;
   write_cell(folder, Cell(), 12);
   CalibrateCommandOptions options;
-  options.dataset = folder.path.string();
+  options.dataset = folder.path().string();
   options.json = true;
   for (const char* name : {"first", "second"}) {
-    options.out = (folder.path / name).string();
+    options.out = (folder.path() / name).string();
     REQUIRE(run_calibrate_command(options) == 0);
   }
   const std::string page = folder.read("first/report.html");
@@ -164,7 +136,7 @@ TEST_CASE("calibrate --out writes a page and figures of several targets, the sam
   json.erase("wall");
   again.erase("wall");
   CHECK(json == again);
-  CHECK(json["cell"] == folder.path.filename().string());
+  CHECK(json["cell"] == folder.path().filename().string());
   CHECK(json["mapping"].is_null());
   const auto& hand_eye = json["hand_eye"];
   REQUIRE(hand_eye["targets"].size() == 2);
@@ -185,7 +157,7 @@ TEST_CASE("calibrate --out writes a page and figures of several targets, the sam
 
 TEST_CASE("a target that one picture shows is kept, one that none shows is dropped, both with a note",
           "[app][calibration]") {
-  const Folder folder("rare");
+  const DataFolder folder;
   write_cell(folder, Cell(), 12);
   std::string kept;
   std::istringstream lines(folder.read("corners.csv"));
@@ -195,7 +167,7 @@ TEST_CASE("a target that one picture shows is kept, one that none shows is dropp
   folder.write("corners.csv", kept);
   folder.write("board.yaml",
                "boards:\n" + kDoor + kTable + "  - {name: shelf, type: marker, mark_size_m: 0.1, first_id: 40}\n");
-  const auto data = read_calibration_dataset(folder.path);
+  const auto data = read_calibration_dataset(folder.path());
   if (!data) FAIL(data.error().detail());
   std::string notes;
   for (const std::string& note : data->notes) notes += note + "\n";
@@ -207,7 +179,7 @@ TEST_CASE("a target that one picture shows is kept, one that none shows is dropp
 }
 
 TEST_CASE("what is wrong with a list of boards or the column of targets is named", "[app][calibration]") {
-  const Folder folder("refused");
+  const DataFolder folder;
   write_cell(folder, Cell(), 6);
   const auto boards = [&](const std::string& list) { folder.write("board.yaml", list); };
   boards("boards:\n" + kDoor +
@@ -232,22 +204,22 @@ TEST_CASE("what is wrong with a list of boards or the column of targets is named
 
 TEST_CASE("pictures give the targets that they show", "[app][calibration]") {
   const Cell cell;
-  const Folder folder("images");
+  const DataFolder folder;
   Random random(72);
-  std::string poses = "image,x,y,z,qx,qy,qz,qw\n";
+  std::string poses = test::kPosesHeader;
   for (int i = 0; i < 4; ++i) {
     const Setup& setup = i % 2 == 0 ? cell.door : cell.table;
     const Pose camera_T_board = test::random_camera_T_board(setup, random);
     const std::string name = fmt::format("{}.png", i);
-    write_png(folder.path / name, test::draw_board(setup.camera, setup.board, camera_T_board));
-    poses += pose_row(name, test::flange_for(setup, camera_T_board));
+    write_png(folder.path() / name, test::draw_board(setup.camera, setup.board, camera_T_board));
+    poses += fmt::format("{},{}\n", name, test::numbers(test::flange_for(setup, camera_T_board)));
   }
-  write_png(folder.path / "wall.png", {std::vector<std::uint8_t>(640 * 480, 130), 640, 480});
-  poses += pose_row("wall.png", Pose::Identity());
+  write_png(folder.path() / "wall.png", {std::vector<std::uint8_t>(640 * 480, 130), 640, 480});
+  poses += fmt::format("wall.png,{}\n", test::numbers(Pose::Identity()));
   folder.write("board.yaml", "boards:\n" + kDoor + kTable);
-  folder.write("camera_info.yaml", camera_yaml(cell.door.camera));
+  folder.write("camera_info.yaml", test::camera_yaml(cell.door.camera));
   folder.write("poses.csv", poses);
-  const auto data = read_calibration_dataset(folder.path);
+  const auto data = read_calibration_dataset(folder.path());
   if (!data) FAIL(data.error().detail());
   CHECK(data->names == std::vector<std::string>{"0.png, door", "1.png, table", "2.png, door", "3.png, table"});
   CHECK(data->images[3] == "3.png");

@@ -7,42 +7,21 @@
 
 #include "app/cli/calibrate_command.hpp"
 #include "app/dataset/calibration_dataset.hpp"
+#include "tests/support/recorded_data.hpp"
 #include "tests/unit/calibration/synthetic_touches.hpp"
 
 using namespace firstlook;
 using Catch::Matchers::Contains;
+using test::DataFolder;
 using test::Setup;
 using test::Toucher;
 namespace fs = std::filesystem;
 
 namespace {
 
-struct Folder {
-  fs::path path;
-  explicit Folder(const std::string& name) : path(fs::temp_directory_path() / ("firstlook_touches_" + name)) {
-    fs::remove_all(path);
-    fs::create_directories(path);
-  }
-  ~Folder() { fs::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  void write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
-  [[nodiscard]] std::string read(const std::string& name) const {
-    std::ifstream stream(path / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
-};
-
-std::string numbers(const Pose& pose) {
-  const Eigen::Quaterniond q(pose.linear());
-  const Eigen::Vector3d t = pose.translation();
-  return fmt::format("{:.12g},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g},{:.12g}", t.x(), t.y(), t.z(), q.x(), q.y(),
-                     q.z(), q.w());
-}
-
 /// Views and, of the first of them, four more looks from the same place.
-void write_views(const Folder& folder, const Setup& s, Random& random, const CameraIntrinsics& said_camera) {
-  std::string poses = "image,x,y,z,qx,qy,qz,qw\n", corners = "image,column,row,u_px,v_px\n";
+void write_views(const DataFolder& folder, const Setup& s, Random& random, const CameraIntrinsics& said_camera) {
+  std::string poses = test::kPosesHeader, corners = "image,column,row,u_px,v_px\n";
   CalibrationView first;
   for (int i = 0; i < 19; ++i) {
     const Pose flange = test::flange_for(s, test::random_camera_T_board(s, random));
@@ -55,20 +34,14 @@ void write_views(const Folder& folder, const Setup& s, Random& random, const Cam
         px += scatter.cwiseProduct(Eigen::Vector2d(random.normal(), random.normal()));
       }
     }
-    poses += fmt::format("{}.png,{}\n", i, numbers(view.base_T_flange.pose()));
+    poses += fmt::format("{}.png,{}\n", i, test::numbers(view.base_T_flange.pose()));
     for (int c = 0; c < s.board.corners(); ++c) {
       const Eigen::Vector2d& px = view.corners_px[static_cast<std::size_t>(c)];
-      corners += fmt::format("{}.png,{},{},{:.9g},{:.9g}\n", i, c % s.board.inner_columns, c / s.board.inner_columns,
-                             px.x(), px.y());
+      corners += test::corner_row(i, c, s.board.inner_columns, px);
     }
   }
   folder.write("board.yaml", board_yaml(s.board));
-  const CameraIntrinsics& c = said_camera;
-  folder.write("camera_info.yaml",
-               fmt::format("image_width: {}\nimage_height: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}, 0, {}, 0, "
-                           "{}, {}, 0, 0, 1]}}\ndistortion_model: plumb_bob\ndistortion_coefficients: {{rows: 1, cols: "
-                           "5, data: [{}, {}, {}, {}, {}]}}\n",
-                           c.width, c.height, c.fx, c.cx, c.fy, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3));
+  folder.write("camera_info.yaml", test::camera_yaml(said_camera));
   folder.write("poses.csv", poses);
   folder.write("corners.csv", corners);
 }
@@ -77,7 +50,7 @@ std::string touches_csv(const BoardSpec& board, const std::vector<Touch>& touche
   std::string text = "column,row,x,y,z,qx,qy,qz,qw\n";
   for (const Touch& t : touches) {
     text += fmt::format("{},{},{}\n", t.corner % board.inner_columns, t.corner / board.inner_columns,
-                        numbers(t.base_T_flange.pose()));
+                        test::numbers(t.base_T_flange.pose()));
   }
   return text;
 }
@@ -93,10 +66,10 @@ struct Outcome {
   std::string report;
 };
 
-Outcome calibrate(const Folder& folder, const std::string& out) {
+Outcome calibrate(const DataFolder& folder, const std::string& out) {
   CalibrateCommandOptions options;
-  options.dataset = folder.path.string();
-  options.out = (folder.path / out).string();
+  options.dataset = folder.path().string();
+  options.out = (folder.path() / out).string();
   options.strict = true;
   Outcome outcome;
   outcome.code = run_calibrate_command(options);
@@ -112,7 +85,7 @@ Outcome calibrate(const Folder& folder, const std::string& out) {
 TEST_CASE("touches of recorded data test the calibration, the tip given or estimated", "[app][calibration]") {
   const Setup s;
   const Toucher toucher;
-  const Folder folder("good");
+  const DataFolder folder;
   Random random(81);
   write_views(folder, s, random, s.camera);
   const Outcome untouched = calibrate(folder, "untouched");
@@ -159,7 +132,7 @@ TEST_CASE("touches of recorded data test the calibration, the tip given or estim
 TEST_CASE("touches that contradict the calibration reject it, with the reason", "[app][calibration]") {
   const Setup s;
   const Toucher toucher;
-  const Folder folder("bad");
+  const DataFolder folder;
   Random random(82);
   write_views(folder, s, random, s.camera);
   CHECK(calibrate(folder, "untouched").code == 0);
@@ -172,20 +145,20 @@ TEST_CASE("touches that contradict the calibration reject it, with the reason", 
   CHECK(bad.code == 5);
   CHECK(bad.hand_eye["verdict"] == "rejected");
   CHECK_THAT(bad.hand_eye["reasons"][0].get<std::string>(), Contains("the touch test contradicts the calibration"));
-  CHECK_FALSE(fs::exists(folder.path / "touched/ros"));
+  CHECK_FALSE(fs::exists(folder.path() / "touched/ros"));
   CHECK_THAT(bad.report, Contains("the touch test contradicts the calibration"));
 }
 
 TEST_CASE("broken touches are refused with file and line", "[app][calibration][hostile]") {
   const Setup s;
-  const Folder folder("broken");
+  const DataFolder folder;
   Random random(83);
   write_views(folder, s, random, s.camera);
   const auto touches = test::touch(s, {}, test::spread_corners(s.board, 2), random);
   const std::string good = touches_csv(s.board, touches);
   const auto refusal = [&](const std::string& csv) {
     folder.write("touches.csv", csv);
-    const auto data = read_calibration_dataset(folder.path);
+    const auto data = read_calibration_dataset(folder.path());
     return data ? std::string("read") : std::string(data.error().detail());
   };
   const std::string head = "column,row,x,y,z,qx,qy,qz,qw\n", pose = "0.5,0,0.3,0,0,0,1\n";
@@ -205,7 +178,7 @@ TEST_CASE("broken touches are refused with file and line", "[app][calibration][h
   folder.write("touches.csv", good);
   const auto tip_refusal = [&](const std::string& yaml) {
     folder.write("tip.yaml", yaml);
-    const auto data = read_calibration_dataset(folder.path);
+    const auto data = read_calibration_dataset(folder.path());
     return data ? std::string("read") : std::string(data.error().detail());
   };
   CHECK(tip_refusal("flange_p_tip_m: [0, 0, 0.14]\n") == "read");
@@ -215,7 +188,7 @@ TEST_CASE("broken touches are refused with file and line", "[app][calibration][h
   CHECK_THAT(tip_refusal("sigma_m: 0.001\n"), Contains("no key 'flange_p_tip_m'"));
   CHECK_THAT(tip_refusal("flange_p_tip_m: [0, 0, 0.1]\nsigma: 1\n"), Contains("tip.yaml:2: unknown key 'sigma'"));
   CHECK_THAT(tip_refusal("flange_p_tip_m: [0, 0, 0.1]\nsigma_m: -1\n"), Contains("tip.yaml:2: sigma_m must lie in"));
-  fs::remove(folder.path / "tip.yaml");
+  fs::remove(folder.path() / "tip.yaml");
 
   // Read well, but of one orientation: nothing tells the tip.
   test::Toucher stiff;
@@ -223,9 +196,9 @@ TEST_CASE("broken touches are refused with file and line", "[app][calibration][h
   folder.write("touches.csv", touches_csv(s.board, test::touch(s, stiff, test::spread_corners(s.board, 2), random)));
   CHECK(calibrate(folder, "stiff").code == 3);
 
-  fs::remove(folder.path / "touches.csv");
+  fs::remove(folder.path() / "touches.csv");
   folder.write("tip.yaml", "flange_p_tip_m: [0, 0, 0.14]\n");
-  const auto unused = read_calibration_dataset(folder.path);
+  const auto unused = read_calibration_dataset(folder.path());
   REQUIRE(unused);
   CHECK_THAT(unused->notes.back(), Contains("tip.yaml: not used"));
 }
@@ -233,17 +206,17 @@ TEST_CASE("broken touches are refused with file and line", "[app][calibration][h
 TEST_CASE("pose pairs are tested by touch when the board's size is known", "[app][calibration]") {
   const Setup s;
   const Toucher toucher;
-  const Folder folder("pairs");
+  const DataFolder folder;
   Random random(84);
   std::string rows =
       "flange_x,flange_y,flange_z,flange_qx,flange_qy,flange_qz,flange_qw,"
       "board_x,board_y,board_z,board_qx,board_qy,board_qz,board_qw\n";
   for (const PosePair& pair : test::observe_pairs(s, 20, random)) {
-    rows += numbers(pair.base_T_flange.pose()) + "," + numbers(pair.camera_T_board.pose()) + "\n";
+    rows += test::numbers(pair.base_T_flange.pose()) + "," + test::numbers(pair.camera_T_board.pose()) + "\n";
   }
   folder.write("pairs.csv", rows);
   folder.write("touches.csv", touches_csv(s.board, test::touch(s, toucher, test::spread_corners(s.board, 2), random)));
-  const auto sizeless = read_calibration_dataset(folder.path);
+  const auto sizeless = read_calibration_dataset(folder.path());
   REQUIRE_FALSE(sizeless);
   CHECK(sizeless.error().fault == Fault::kDataMissing);
   CHECK_THAT(std::string(sizeless.error().detail()), Contains("board.yaml: touches.csv needs it"));

@@ -4,6 +4,8 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
+#include "algorithms/mapping/ray_marker.hpp"
+#include "platform/core/processor.hpp"
 #include "platform/core/random.hpp"
 
 namespace firstlook {
@@ -32,7 +34,7 @@ std::vector<std::uint16_t> random_depth(Random& random) {
 }
 
 struct Planes {
-  std::vector<std::uint64_t> hits, by_rays, by_voxels;
+  std::vector<std::uint64_t> hits, by_rays, by_four_rays, by_voxels, portable;
 };
 
 Planes both_ways(const GridGeometry& geometry, const DepthSensor& sensor, const std::vector<std::uint16_t>& values,
@@ -41,12 +43,14 @@ Planes both_ways(const GridGeometry& geometry, const DepthSensor& sensor, const 
   DepthRays rays(sensor);
   RangeImage image(kWidth, kHeight);
   Planes planes;
-  for (auto* plane : {&planes.hits, &planes.by_rays, &planes.by_voxels}) {
+  for (auto* plane : {&planes.hits, &planes.by_rays, &planes.by_four_rays, &planes.by_voxels, &planes.portable}) {
     plane->assign(VoxelMap::bit_words(geometry), 0);
   }
   RayMarker marker(geometry, pose.translation().cast<float>(), planes.by_rays);
+  std::vector<Eigen::Vector3f> ends_m;
   rays.for_each(depth, pose, {}, [&](const RayEnd& ray) {
     marker.mark_passed(ray.end_m);
+    ends_m.push_back(ray.end_m);
     const Eigen::Vector3i voxel = octomap_voxel(geometry, ray.end_m);
     if (!ray.is_hit || !geometry.contains(voxel)) return;
     planes.hits[geometry.index(voxel) >> 6] |= 1ULL << (geometry.index(voxel) & 63);
@@ -59,7 +63,10 @@ Planes both_ways(const GridGeometry& geometry, const DepthSensor& sensor, const 
     image.set_row(v, reach_m);
   });
   image.build_levels();
-  PassedVoxels(geometry, rays, image, depth, pose, planes.hits, planes.by_voxels).mark();
+  RayMarker(geometry, pose.translation().cast<float>(), planes.by_four_rays).mark_all_passed(ends_m);
+  mark_passed_voxels(geometry, rays, image, depth, pose, planes.hits, planes.by_voxels);
+  const PortableOnly without_avx2;
+  mark_passed_voxels(geometry, rays, image, depth, pose, planes.hits, planes.portable);
   return planes;
 }
 
@@ -67,6 +74,8 @@ int differences(const Planes& planes) {
   int count = 0;
   for (std::size_t i = 0; i < planes.hits.size(); ++i) {
     count += std::popcount((planes.by_rays[i] ^ planes.by_voxels[i]) & ~planes.hits[i]);
+    count += std::popcount((planes.by_rays[i] ^ planes.portable[i]) & ~planes.hits[i]);
+    count += std::popcount(planes.by_rays[i] ^ planes.by_four_rays[i]);
   }
   return count;
 }

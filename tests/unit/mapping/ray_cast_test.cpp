@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "platform/core/processor.hpp"
 #include "platform/core/random.hpp"
 
 namespace firstlook {
@@ -51,10 +52,10 @@ GainCount count_by_sampling(const VoxelMap& map, const GainRays& rays, const Tra
 
 GainCount count(const VoxelMap& map, const GainRays& rays, const Transform<Base, Depth>& pose, UnknownReading reading,
                 std::span<const std::uint8_t> weights = {}, double range_min_m = 0) {
-  GainPlane plane(map.size());
-  build_gain_plane(map, weights, plane);
+  GainPlane plane(kGrid);
+  build_gain_plane(map, weights, reading, plane);
   GainScratch scratch(kGrid);
-  return count_unknown(kGrid, plane, rays, pose, range_min_m, reading, scratch);
+  return count_unknown(plane, rays, pose, range_min_m, scratch);
 }
 
 }  // namespace
@@ -117,6 +118,52 @@ TEST_CASE("stopping at unknown gives the voxels where OctoMap's castRay ends", "
   }
 }
 
+TEST_CASE("packets of rays count what rays walked one by one count, with AVX2 and without", "[mapping][gain]") {
+  std::uint64_t counted = 0;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    Random random(seed, 17);
+    const double resolution_m = random.uniform(0.02, 0.08);
+    const Eigen::Vector3d low_m(random.uniform(-1.5, -0.5), -1, random.uniform(-1.2, -0.6));
+    VoxelMap map(GridGeometry::covering(low_m, {1, 1.1, 0.9}, resolution_m), VoxelMap::Planes::kLogOddsOnly);
+    const int lumps = random.below(60);
+    for (std::size_t i = 0; i < map.size(); ++i) map.set(i, VoxelClass::kFree, 0);
+    for (int lump = 0; lump < lumps; ++lump) {
+      const Eigen::Vector3d center(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+      const double radius_m = random.uniform(0.02, 0.3);
+      for (std::size_t i = 0; i < map.size(); ++i) {
+        if ((map.geometry().center_m(map.geometry().voxel_at(i)) - center).norm() < radius_m)
+          map.set(i, lump % 3 == 0 ? VoxelClass::kOccupied : VoxelClass::kUnknown, 0);
+      }
+    }
+    std::vector<std::uint8_t> weights(map.size());
+    for (std::uint8_t& weight : weights) weight = static_cast<std::uint8_t>(random.below(3));
+    GainPlane plane(map.geometry());
+    GainScratch scratch(map.geometry());
+    const GainRays rays = fan(30 + random.below(5), 21);
+    for (const UnknownReading reading : {UnknownReading::kSeeThrough, UnknownReading::kStop}) {
+      build_gain_plane(map, weights, reading, plane);
+      for (int view = 0; view < 6; ++view) {
+        // Two exactly along the grid's axes, from a voxel's face.
+        const bool aligned = view < 2;
+        const Eigen::Vector3d at_m =
+            aligned ? Eigen::Vector3d(2 * resolution_m, 0, view * 0.013) : Eigen::Vector3d(0.7 * random.direction());
+        const Transform<Base, Depth> pose(aligned ? Eigen::Quaterniond::Identity() : random.rotation(), at_m);
+        const double range_min_m = random.uniform(0, 0.5);
+        const GainCount walked = count_unknown_by_walking(plane, rays, pose, range_min_m, scratch);
+        const GainCount packets = count_unknown(plane, rays, pose, range_min_m, scratch);
+        const PortableOnly without_avx2;
+        const GainCount portable = count_unknown(plane, rays, pose, range_min_m, scratch);
+        INFO("seed " << seed << " view " << view);
+        REQUIRE(packets.voxels == walked.voxels);
+        REQUIRE(packets.weight == walked.weight);
+        REQUIRE(portable.weight == walked.weight);
+        counted += walked.voxels;
+      }
+    }
+  }
+  CHECK(counted > 50000);
+}
+
 TEST_CASE("weights count, zero weight is seen through, the near part counts nothing", "[mapping][gain]") {
   VoxelMap map(kGrid);  // all unknown
   GainRays one;
@@ -140,14 +187,14 @@ TEST_CASE("weights count, zero weight is seen through, the near part counts noth
 
 TEST_CASE("the counter of views wraps without losing voxels", "[mapping][gain]") {
   VoxelMap map(kGrid);
-  GainPlane plane(map.size());
-  build_gain_plane(map, {}, plane);
+  GainPlane plane(kGrid);
+  build_gain_plane(map, {}, UnknownReading::kSeeThrough, plane);
   GainScratch scratch(kGrid);
   const GainRays rays = fan(6, 4);
   const Transform<Base, Depth> here(Eigen::Quaterniond::Identity(), {0, 0, 0}),
       there(Eigen::Quaterniond::Identity(), {9, 9, 9});
   const auto look = [&](const Transform<Base, Depth>& pose) {
-    return count_unknown(kGrid, plane, rays, pose, 0, UnknownReading::kSeeThrough, scratch).voxels;
+    return count_unknown(plane, rays, pose, 0, scratch).voxels;
   };
   const std::uint32_t first = look(here);
   REQUIRE(first > 0);

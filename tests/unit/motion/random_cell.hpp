@@ -31,7 +31,7 @@ struct RandomCell {
       const double away = random.uniform(0.6, 1.2);
       add_box(Eigen::Vector3d(away * std::cos(angle), away * std::sin(angle), random.uniform(-0.1, 1.3)), half);
     }
-    field.rebuild(free);
+    field.update(free);
   }
 
   void add_box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half) {
@@ -70,8 +70,8 @@ inline RandomCell take_from_zone(RandomCell& cell, std::uint64_t seed, int voxel
     const Eigen::Vector3d p(away * std::cos(angle), away * std::sin(angle), random.uniform(0.0, 1.1));
     cell.free[cell.grid.index(cell.grid.voxel(p))] = left.free[left.grid.index(left.grid.voxel(p))] = 0;
   }
-  cell.field.rebuild(cell.free);
-  left.field.rebuild(left.free);
+  cell.field.update(cell.free);
+  left.field.update(left.free);
   return left;
 }
 

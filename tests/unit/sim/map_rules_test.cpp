@@ -213,9 +213,9 @@ TEST_CASE(
   const auto is_certified = [&] {
     const VoxelMap& map = mapper.map();
     map.free_mask(mapper.now_s, kMaxAge_s, mask);
-    field.rebuild(mask);
+    field.update(mask);
     for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = map.zone_revoked(i) ? 0 : 1;
-    revoked.rebuild(mask);
+    revoked.update(mask);
     FreeSpace space;
     space.field = &field;
     space.revoked = &revoked;

@@ -129,7 +129,7 @@ TEST_CASE("an arm with no room to move says that nothing can be reached", "[expl
       return segment_distance_m(p, p, c.a, c.b) < c.radius_m + world.clearance.voxels_m + 0.035;
     });
   }
-  world.field.rebuild(world.free);
+  world.field.update(world.free);
   ExploreOptions options;
   options.certificate_samples = 300;
   const auto choice = chooser.choose(world.context(), world.q, options, run_serially);

@@ -99,7 +99,7 @@ struct SmallWorld {
 
   void update() {
     map.free_mask(now_s, 600, free);
-    field.rebuild(free);
+    field.update(free);
     space.field = &field;
     space.zone_intact = true;
     for (std::size_t i = 0; i < map.size(); ++i) {
