@@ -8,8 +8,11 @@
 namespace firstlook {
 namespace {
 
+/// The rows of sums that a window needs, those between its first and last among them.
+std::size_t sum_rows(const PlaneFitOptions& options) { return static_cast<std::size_t>(options.window_px) + 1; }
+
 std::size_t sum_count(const CameraIntrinsics& camera, const PlaneFitOptions& options) {
-  return options.is_on() ? static_cast<std::size_t>(camera.width + 1) * static_cast<std::size_t>(camera.height + 1) : 0;
+  return options.is_on() ? static_cast<std::size_t>(camera.width + 1) * sum_rows(options) : 0;
 }
 
 }  // namespace
@@ -34,32 +37,35 @@ std::size_t PlaneFit::required_bytes(const CameraIntrinsics& camera, const Plane
   return sum_count(camera, options) * sizeof(Sums);
 }
 
-void PlaneFit::add_up(ImageView<const std::uint16_t> pixels, double units_per_m) {
-  const auto row = static_cast<std::size_t>(width_) + 1;
-  for (int v = 0; v < pixels.height; ++v) {
-    Sums so_far;
-    for (int u = 0; u < pixels.width; ++u) {
-      if (const std::uint16_t value = pixels.at(u, v); value != 0) {
-        const double d = units_per_m / value;
-        so_far += {1, d, d * d, u * d, v * d};
-      }
-      const std::size_t here = static_cast<std::size_t>(v + 1) * row + static_cast<std::size_t>(u + 1);
-      sums_[here] = sums_[here - row];
-      sums_[here] += so_far;
+std::span<PlaneFit::Sums> PlaneFit::sums_above(int row) {
+  const auto length = static_cast<std::size_t>(width_) + 1;
+  return std::span(sums_).subspan(static_cast<std::size_t>(row) % sum_rows(options_) * length, length);
+}
+
+void PlaneFit::add_row(ImageView<const std::uint16_t> pixels, double units_per_m, int v) {
+  const std::span<const Sums> above = sums_above(v);
+  const std::span<Sums> below = sums_above(v + 1);
+  Sums so_far;
+  below[0] = {};
+  for (int u = 0; u < pixels.width; ++u) {
+    if (const std::uint16_t value = pixels.at(u, v); value != 0) {
+      const double d = units_per_m / value;
+      so_far += {1, d, d * d, u * d, v * d};
     }
+    const auto next = static_cast<std::size_t>(u) + 1;
+    below[next] = above[next];
+    below[next] += so_far;
   }
 }
 
-PlaneFit::Sums PlaneFit::window(int u, int v) const {
+PlaneFit::Sums PlaneFit::window(int u, int v) {
   const int half = options_.window_px / 2;
-  const auto at = [&](int column, int row) -> const Sums& {
-    return sums_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ + 1) +
-                 static_cast<std::size_t>(column)];
-  };
-  Sums sums = at(u + half + 1, v + half + 1);
-  sums -= at(u - half, v + half + 1);
-  sums -= at(u + half + 1, v - half);
-  sums += at(u - half, v - half);
+  const std::span<const Sums> top = sums_above(v - half), bottom = sums_above(v + half + 1);
+  const auto left = static_cast<std::size_t>(u - half), right = static_cast<std::size_t>(u + half + 1);
+  Sums sums = bottom[right];
+  sums -= bottom[left];
+  sums -= top[right];
+  sums += top[left];
   return sums;
 }
 
@@ -76,7 +82,11 @@ std::uint32_t PlaneFit::apply(ImageView<std::uint16_t> pixels, double units_per_
   // Squared residuals over the variance: their mean and three standard deviations of it.
   const double residual_max = (n - 3) + 3 * std::sqrt(2 * (n - 3));
   std::uint32_t replaced = 0;
-  for (int v = half; v + half < pixels.height; ++v) {
+  for (int row = 0; row < pixels.height; ++row) {
+    // A row is added up as it was read; those that are moved lie above.
+    add_row({pixels.data, pixels.width, pixels.height}, units_per_m, row);
+    const int v = row - half;
+    if (v < half) continue;
     for (int u = half; u + half < pixels.width; ++u) {
       const Sums s = window(u, v);
       if (s.n < n) continue;

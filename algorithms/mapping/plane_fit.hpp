@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "platform/core/camera_intrinsics.hpp"
@@ -37,12 +38,14 @@ class PlaneFit {
     Sums& operator+=(const Sums& other);
     Sums& operator-=(const Sums& other);
   };
-  void add_up(ImageView<const std::uint16_t> pixels, double units_per_m);
-  [[nodiscard]] Sums window(int u, int v) const;
+  /// Those of the pixels above a row; the last window_px + 1 rows are kept.
+  [[nodiscard]] std::span<Sums> sums_above(int row);
+  void add_row(ImageView<const std::uint16_t> pixels, double units_per_m, int v);
+  [[nodiscard]] Sums window(int u, int v);
 
   PlaneFitOptions options_;
   int width_ = 0;
-  std::vector<Sums> sums_;  ///< (width + 1) x (height + 1)
+  std::vector<Sums> sums_;  ///< rows of width + 1
 };
 
 }  // namespace firstlook
