@@ -71,10 +71,8 @@ PlaneFit::Sums PlaneFit::window(int u, int v) {
 
 std::uint32_t PlaneFit::apply(ImageView<std::uint16_t> pixels, double units_per_m) {
   if (!options_.is_on()) return 0;
-  ENSURE(3126, pixels.width == width_ &&
-                   (static_cast<std::size_t>(pixels.width) + 1) * (static_cast<std::size_t>(pixels.height) + 1) ==
-                       sums_.size());
-  add_up({pixels.data, pixels.width, pixels.height}, units_per_m);
+  ENSURE(3126, pixels.width == width_);
+  std::ranges::fill(sums_above(0), Sums{});
   const int half = options_.window_px / 2;
   const double n = options_.window_px * options_.window_px;
   // Sum of squared column (or row) numbers around the middle, over the window.
