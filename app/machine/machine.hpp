@@ -29,8 +29,6 @@ struct MachineSettings {
   bool depth_beside = true;    ///< depth frames beside the colour frames of calibration views
   bool see_on_the_way = true;  ///< frames between calibration views, for the offsets of the stamps
   int explore_views_max = 60;
-  double mapping_time_max_s =
-      480;  ///< from the first look on: what was seen first must not be too old for the way back
   double frames_while_moving_hz = 2;
   FixedVector<std::int32_t, kTouchPointsMax> touch_points;  ///< of the board, for the touch test; empty: none
   std::int32_t touch_columns = 0;  ///< points in a row of the board; 0: they are called by their numbers
