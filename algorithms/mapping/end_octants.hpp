@@ -13,7 +13,7 @@
 namespace firstlook {
 
 /// Finds the octants in which the rays of frames end: the same as octomap_voxel() and octant_of() of DepthRays' ends,
-/// at a third of their cost. Coordinates are floats; pixels whose voxel, octant or range rounding could decide, some in
+/// at a fraction of the cost. Coordinates are floats; pixels whose voxel, octant or range rounding could decide, some in
 /// a thousand, are computed as DepthRays does. Memory is taken at construction.
 class EndOctants {
  public:

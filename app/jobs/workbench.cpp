@@ -34,6 +34,11 @@ GridGeometry fine_geometry(const Config& config) {
                                 config.map.fine_resolution_m);
 }
 
+/// Of the prior map, and of what rays meet in it.
+std::size_t prior_bytes(const GridGeometry& geometry) {
+  return VoxelMap::required_bytes(geometry, VoxelMap::Planes::kLogOddsOnly) + GainModel::prior_bytes(geometry);
+}
+
 std::size_t fine_map_bytes(const Config& config) {
   return config.map.fine_resolution_m > 0
              ? VoxelMap::required_bytes(fine_geometry(config), VoxelMap::Planes::kLogOddsOnly)
@@ -69,11 +74,8 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
   const GridGeometry geometry =
       GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
   const bool has_prior = config.map.prior != "none";
-  const std::size_t prior_bytes =
-      has_prior ? VoxelMap::required_bytes(geometry, VoxelMap::Planes::kLogOddsOnly) + GainModel::prior_bytes(geometry)
-                : 0;
   const std::size_t needed = VoxelMap::required_bytes(geometry, planes_of(config)) + 3 * geometry.count() +
-                             fine_map_bytes(config) + prior_bytes;
+                             fine_map_bytes(config) + (has_prior ? prior_bytes(geometry) : 0);
   if (needed > memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) {
     return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m{} need {:.1f} MiB, the budget holds {:.1f} MiB",
                    geometry.size.x(), geometry.size.y(), geometry.size.z(), geometry.resolution_m,
@@ -163,7 +165,7 @@ Status Workbench::take_memory() {
                                 static_cast<std::size_t>(board_.corners()) * point;
   for (const auto& [pool, bytes] : {
            std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g, planes_of(config_)) + 3 * g.count() +
-                                                     fine_map_bytes(config_) + (prior_ ? 2 * g.count() : 0)},
+                                                     fine_map_bytes(config_) + (prior_ ? prior_bytes(g) : 0)},
            std::pair{memory::Pool::kDistanceField,
                      2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor) + options},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},

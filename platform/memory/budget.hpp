@@ -56,7 +56,7 @@ inline constexpr std::array kBudget = {
     BudgetRow{Pool::kDepthFrames,      "depth frames",        3,  640 * 480 * 2,    "jobs",        "one being captured, one being integrated, one for the report"},
     BudgetRow{Pool::kColorFrames,      "colour frames",       4,  640 * 480,        "jobs",        "grey images: captured, detected, first of a pair, report"},
     BudgetRow{Pool::kPlannerNodes,     "planner nodes",       2,  2 * kMiB,         "jobs",        "two trees of RRT-Connect"},
-    BudgetRow{Pool::kViewCandidates,   "view candidates",     1,  2 * kMiB,         "jobs",        "configurations, gains and visibility masks"},
+    BudgetRow{Pool::kViewCandidates,   "view candidates",     1,  4 * kMiB,         "jobs",        "configurations, what rays meet and the room around it, visibility masks"},
     BudgetRow{Pool::kEventQueue,       "event queue",         1,  1280 * kKiB,      "loop",        "64 events of 16 KiB with their heads"},
     BudgetRow{Pool::kJournal,          "journal buffer",      1,  1 * kMiB,         "loop",        "records between two writes to the disk"},
     BudgetRow{Pool::kJobBuffers,       "job buffers",         8,  32 * kKiB,        "loop, jobs",  "arguments (8 KiB) and result (16 KiB) of each outstanding job"},
