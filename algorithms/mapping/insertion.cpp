@@ -180,10 +180,15 @@ void Inserter::mark_by_rays(VoxelMap& map, const DepthImage& depth, const Transf
 
 void Inserter::mark_by_voxels(VoxelMap& map, const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
                               std::span<const float> self_depth_m, PixelCounts& counts) {
-  counts =
-      end_octants_.find(rays_, depth, base_T_depth, self_depth_m, image_, [&](std::span<const std::int32_t> octants) {
-        for (const std::int32_t octant : octants) mark_hit(map, octant);
-      });
+  const auto mark_hits = [&](std::span<const std::int32_t> octants) {
+    for (const std::int32_t octant : octants) mark_hit(map, octant);
+  };
+  if (ground_) {  // asks for each end's height
+    counts =
+        rays_.for_each_row(depth, base_T_depth, self_depth_m, [&](int v, const RayRow& row) { note_row(map, v, row); });
+  } else {
+    counts = end_octants_.find(rays_, depth, base_T_depth, self_depth_m, image_, mark_hits);
+  }
   image_.build_levels();
   mark_passed_voxels(geometry_, rays_, image_, depth, base_T_depth, hit_, missed_);
 }
