@@ -46,7 +46,7 @@ Vector7d error_of(const DepthSetup& s, const DepthMount& mount) {
   return error;
 }
 
-DepthToColor estimated(const DepthSetup& s, std::span<const DepthStop> stops) {
+DepthToColor estimated(std::span<const DepthStop> stops) {
   const auto result = estimate_depth_to_color(stops, factory());
   if (!result) FAIL(result.error().detail());
   return *result;
@@ -83,7 +83,7 @@ TEST_CASE("the depth camera is found as sure as the covariance says", "[calibrat
   Vector7d squares = Vector7d::Zero(), variances = Vector7d::Zero();
   for (int trial = 0; trial < kTrials; ++trial) {
     const DepthSetup s = drawn(random);
-    const DepthToColor result = estimated(s, observe_stops(s, 15, random));
+    const DepthToColor result = estimated(observe_stops(s, 15, random));
     const Vector7d error = error_of(s, result.mount);
     nees += error.dot(result.mount.covariance.inverse() * error) / kTrials;
     belief += result.belief.chi2 / result.belief.degrees_of_freedom / kTrials;
@@ -109,7 +109,7 @@ TEST_CASE("5 mm and 10 mrad that the factory does not know of are found within 3
   Vector6d off;
   off << 0.003, -0.003, 0.0026, 0.006, 0.006, -0.0053;
   s.camera_T_depth = perturb(s.camera_T_depth, off);
-  const DepthToColor result = estimated(s, observe_stops(s, 15, random));
+  const DepthToColor result = estimated(observe_stops(s, 15, random));
   const Vector7d error = error_of(s, result.mount), sigma = result.mount.covariance.diagonal().cwiseSqrt();
   for (int k = 0; k < 7; ++k) CHECK(std::abs(error[k]) < 3 * sigma[k]);
   CHECK((result.moved - off).head<3>().norm() < 0.003);
@@ -123,7 +123,7 @@ TEST_CASE("a factory pose that is far wrong is contradicted", "[calibration]") {
   off[2] = 0.02;  // four of its sigmas
   off[3] = 0.03;
   s.camera_T_depth = perturb(s.camera_T_depth, off);
-  const DepthToColor result = estimated(s, observe_stops(s, 15, random));
+  const DepthToColor result = estimated(observe_stops(s, 15, random));
   CHECK(result.belief.contradicted());
   CHECK(result.belief.degrees_of_freedom == 7);
   CHECK(error_of(s, result.mount).head<3>().norm() < 0.004);
@@ -134,7 +134,7 @@ TEST_CASE("directions that the boards do not tell stay as believed and are named
   DepthSetup s;
   s.camera_T_depth = perturb(s.camera_T_depth, (Vector6d() << 0.004, 0, 0.003, 0, 0.005, 0.01).finished());
   SECTION("boards that all face the camera at several distances") {
-    const auto result = estimated(s, stops_at(s, {{0, 0, .5}, {0, 0, .6}, {0, 0, .7}, {0, 0, .8}, {0, 0, .9}}, random));
+    const auto result = estimated(stops_at(s, {{0, 0, .5}, {0, 0, .6}, {0, 0, .7}, {0, 0, .8}, {0, 0, .9}}, random));
     CHECK(names(result) == std::vector<std::string>{"translation along x", "translation along y", "rotation about z"});
     CHECK(result.untold[0].sigma_ratio == Approx(1).margin(0.1));
     CHECK(std::abs(result.moved[0]) < 0.001);
@@ -143,13 +143,13 @@ TEST_CASE("directions that the boards do not tell stay as believed and are named
     CHECK(result.belief.degrees_of_freedom == 4);
   }
   SECTION("boards that all tilt about one axis") {
-    const auto result = estimated(
-        s, stops_at(s, {{-.6, 0, .5}, {-.6, 0, .9}, {0, 0, .5}, {0, 0, .9}, {.6, 0, .5}, {.6, 0, .9}}, random));
+    const auto result =
+        estimated(stops_at(s, {{-.6, 0, .5}, {-.6, 0, .9}, {0, 0, .5}, {0, 0, .9}, {.6, 0, .5}, {.6, 0, .9}}, random));
     CHECK(names(result) == std::vector<std::string>{"translation along x"});
   }
   SECTION("one distance: the depth scale and the distance cannot be told apart well") {
     const auto result = estimated(
-        s, stops_at(s, {{-.5, 0, .7}, {.5, 0, .7}, {0, -.5, .7}, {0, .5, .7}, {0, 0, .7}, {.4, .4, .7}}, random));
+        stops_at(s, {{-.5, 0, .7}, {.5, 0, .7}, {0, -.5, .7}, {0, .5, .7}, {0, 0, .7}, {.4, .4, .7}}, random));
     const Vector7d error = error_of(s, result.mount), sigma = result.mount.covariance.diagonal().cwiseSqrt();
     CHECK(error.dot(result.mount.covariance.inverse() * error) < 24.3);  // 0.999 of 7
     CHECK(sigma[6] > 0.002);
@@ -167,7 +167,7 @@ TEST_CASE("a stop whose plane is another's is left out", "[calibration]") {
   const DepthSetup s;
   auto stops = observe_stops(s, 12, random);
   std::swap(stops[3].plane, stops[7].plane);
-  const DepthToColor result = estimated(s, stops);
+  const DepthToColor result = estimated(stops);
   CHECK_FALSE(result.stops[3].used);
   CHECK_FALSE(result.stops[7].used);
   CHECK(error_of(s, result.mount).head<3>().norm() < 0.004);
@@ -188,7 +188,7 @@ TEST_CASE("stops that disagree more than their noise make the result less sure",
       const Vector6d common = (Vector6d() << 0.002 * random.normal3(), 0.005 * random.normal3()).finished();
       stop.camera_T_board = Transform<Camera, Board>(perturb(stop.camera_T_board.pose(), common));
     }
-    const DepthToColor result = estimated(s, stops);
+    const DepthToColor result = estimated(stops);
     CHECK(result.excess.offset_m == Approx(0.002).epsilon(0.6));
     CHECK(result.excess.tilt_rad == Approx(0.005).epsilon(0.6));
     const Vector7d error = error_of(s, result.mount);
