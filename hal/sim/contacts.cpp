@@ -22,6 +22,14 @@ double largest_way_m(const Capsules& from, const Capsules& to) {
   return way_m;
 }
 
+Capsules base_links_of(const Capsules& body) {
+  Capsules links;
+  for (const Capsule& capsule : body) {
+    if (capsule.link <= 1) links.push_back(capsule);
+  }
+  return links;
+}
+
 }  // namespace
 
 Capsule true_housing(int link, const Pose& link_T_camera) {
@@ -38,7 +46,12 @@ Capsules true_capsules(const ArmModel& arm, int link, const Pose& link_T_camera)
 
 ContactMonitor::ContactMonitor(const ArmModel& arm, const Capsules& body, const BaseAllowance& allowance,
                                const SafeZone& zone, const TrueWorld& world)
-    : arm_(arm), body_(body), allowance_(allowance), zone_(zone), world_(&world) {}
+    : arm_(arm),
+      body_(body),
+      base_links_(base_links_of(arm.body)),
+      allowance_(allowance),
+      zone_(zone),
+      world_(&world) {}
 
 void ContactMonitor::set_world(const TrueWorld& world) { world_ = &world; }
 
@@ -57,9 +70,9 @@ bool ContactMonitor::body_moved(Instant, const JointVector& from_rad, const Join
   const int steps = std::max(1, static_cast<int>(std::ceil(way_m / kBodyStep_m)));
   for (int i = 1; i < steps; ++i) {
     const double t = static_cast<double>(i) / steps;
-    check(place(body_, forward(arm_, interpolate(from_rad, to_rad, t))));
+    check(interpolate(from_rad, to_rad, t));
   }
-  check(to);
+  check(to_rad);
   last_ = to;
   return in_contact_;
 }
@@ -70,8 +83,14 @@ void ContactMonitor::body_led() {
   check_number_ += 2;  // what the body overlapped is not what it overlaps
 }
 
-void ContactMonitor::check(const Capsules& placed) {
+void ContactMonitor::check(const JointVector& q_rad) {
   ++checks_;
+  const LinkFrames frames = forward(arm_, q_rad);
+  const Capsules placed = place(body_, frames);
+  allowed_.clear();
+  for (const Capsule& link : place(base_links_, frames)) {
+    if (exempt(link)) allowed_.push_back(link);
+  }
   check_contact(placed);
   view_ != nullptr ? check_voxels(placed) : check_zone(placed);
 }
@@ -104,10 +123,6 @@ void ContactMonitor::check_zone(const Capsules& placed) {
 void ContactMonitor::check_voxels(const Capsules& placed) {
   ++check_number_;
   bool outside_grid = false;
-  allowed_.clear();
-  for (const Capsule& capsule : placed) {
-    if (exempt(capsule)) allowed_.push_back(capsule);
-  }
   for (const Capsule& capsule : placed) {
     if (exempt(capsule)) continue;
     walk_capsule(view_->geometry(), capsule, kOverlapTolerance_m,
@@ -118,7 +133,7 @@ void ContactMonitor::check_voxels(const Capsules& placed) {
 }
 
 /// Whether the part of the capsule that is nearest to the voxel lies inside the safe zone, or inside a link that the
-/// base allowance excuses: the upper arm begins inside the shoulder, and adds nothing there.
+/// base allowance excuses: the upper arm begins inside the housing of joint 2, and adds nothing there.
 ContactMonitor::Excuse ContactMonitor::excuse(const Capsule& placed, const Eigen::Vector3i& voxel) const {
   const Eigen::Vector3d axis = placed.b - placed.a;
   const Eigen::Vector3d to_voxel = view_->geometry().center_m(voxel) - placed.a;

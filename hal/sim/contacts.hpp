@@ -25,8 +25,8 @@ inline constexpr double kOverlapTolerance_m = 1e-6;  ///< less than this is roun
 
 class ContactMonitor final : public BodyWatcher {
  public:
-  /// Links 0 and 1 are exempt while they stay inside the allowance, as for planner and guardian. The world must outlive
-  /// it.
+  /// Links 0 and 1 are exempt while they stay inside the allowance, as for planner and guardian; so is the part of the
+  /// upper arm that turns inside the housing of link 1, which is a sphere for all three. The world must outlive it.
   ContactMonitor(const ArmModel& arm, const Capsules& body, const BaseAllowance& allowance, const SafeZone& zone,
                  const TrueWorld& world);
 
@@ -45,7 +45,7 @@ class ContactMonitor final : public BodyWatcher {
   [[nodiscard]] std::uint64_t checks() const { return checks_; }
 
  private:
-  void check(const Capsules& placed);
+  void check(const JointVector& q_rad);
   void check_contact(const Capsules& placed);
   void check_zone(const Capsules& placed);
   void check_voxels(const Capsules& placed);
@@ -59,6 +59,7 @@ class ContactMonitor final : public BodyWatcher {
 
   const ArmModel arm_;
   const Capsules body_;
+  const Capsules base_links_;  ///< links 0 and 1 as planner and guardian hold them
   const BaseAllowance allowance_;
   const SafeZone zone_;
   const TrueWorld* world_;

@@ -147,6 +147,7 @@ TEST_CASE("where the upper arm begins inside the shoulder, the base allowance ex
     return monitor.unknown_entries();
   };
   CHECK(entries_below(0) == 0);
+  CHECK(entries_below(0.05) == 0);  // still inside the housing
   CHECK(entries_below(0.4) > 0);
   CHECK(entries_below(0.8) > 0);
 }
