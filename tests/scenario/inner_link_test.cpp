@@ -20,7 +20,7 @@ struct Mounted {
 const std::vector<Mounted> kMounted = {
     {1, "position_m: [0.12, 0, 0], rpy_deg: [180, -90, 0]", "center_m: [-0.45, 0.78, 0.20], faces: [0.45, -0.78, 0]",
      "it is on link 1; on link 1 joint 1 alone moves it"},
-    {2, "position_m: [0, 0.1, 0], rpy_deg: [-90, -90, 0]", "center_m: [0.45, 0.78, 0.56], faces: [-0.45, -0.78, 0]",
+    {2, "position_m: [0, 0.1, 0], rpy_deg: [-90, -90, 0]", "center_m: [0.42, 0.73, 0.40], faces: [-0.42, -0.73, 0.10]",
      "it is on link 2; on link 2 joints 1 to 2 move it"},
     {3, "position_m: [0, -0.15, 0]", "center_m: [0.85, 0.2, 0.62], faces: [-0.85, -0.2, 0]",
      "it is on link 3; on link 3 joints 1 to 3 move it"},
