@@ -13,8 +13,8 @@
 namespace firstlook {
 
 /// Finds the octants in which the rays of frames end: the same as octomap_voxel() and octant_of() of DepthRays' ends,
-/// at a fraction of the cost. Coordinates are floats; pixels whose voxel, octant or range rounding could decide, some in
-/// a thousand, are computed as DepthRays does. Memory is taken at construction.
+/// at a fraction of the cost. Coordinates are floats; pixels whose voxel, octant or range rounding could decide, some
+/// in a thousand, are computed as DepthRays does. Memory is taken at construction.
 class EndOctants {
  public:
   /// Coarser depth values than these would overflow: thousands of kilometres.

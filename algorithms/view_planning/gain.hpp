@@ -50,7 +50,9 @@ class GainModel {
 
   /// Takes the memory that contexts with a prior map need: prior_bytes().
   void allow_prior() { prior_plane_.emplace(geometry_); }
-  [[nodiscard]] static std::size_t prior_bytes(const GridGeometry& geometry) { return GainPlane::required_bytes(geometry); }
+  [[nodiscard]] static std::size_t prior_bytes(const GridGeometry& geometry) {
+    return GainPlane::required_bytes(geometry);
+  }
 
   /// Reads map, zone, free space and prior map (after allow_prior() only). Unknown voxels of the zone count; free ones
   /// that motion cannot use yet count as `again`; voxels with futile_max futile looks stop rays like occupied ones.
