@@ -10,9 +10,7 @@ void enter_solve(Machine& m) {
 
 Handled on_solve(Machine& m, const MachineEvent& event) {
   if (const auto result = m.result_of<SolveResult>(JobKind::kSolve, event)) {
-    if (result->solved && result->stamps_wrong) {
-      m.stop_for(Fault::kClockWrong);  // where a frame is taken to be from decides what counts as seen to be free
-    } else if (result->solved) {
+    if (result->solved) {
       m.show("hand-eye sigma {:.2f} mm, {:.2f} mrad; reprojection {:.2f} px", result->sigma_mm, result->sigma_mrad,
              result->reprojection_rms_px);
       if (result->depth_estimated) {
@@ -24,7 +22,8 @@ Handled on_solve(Machine& m, const MachineEvent& event) {
                1000 * result->offsets.depth_s);
       }
       m.progress().relevant = result->targets;
-      m.correct_stamps(result->offsets);
+      m.progress().stamps_wrong = result->stamps_wrong;
+      if (!result->stamps_wrong) m.correct_stamps(result->offsets);
       m.transition(StateId::kValidate);
     } else {
       m.conclude(Outcome::kCalibrationRejected, result->fault);

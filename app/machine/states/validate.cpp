@@ -18,6 +18,10 @@ Handled on_validate(Machine& m, const MachineEvent& event) {
   if (const auto result = m.result_of<ValidateResult>(JobKind::kValidate, event)) {
     if (!result->accepted) {
       m.conclude(Outcome::kCalibrationRejected, Fault::kCalibrationRejected);
+    } else if (m.progress().stamps_wrong) {
+      // Where a frame is taken to be from decides what counts as seen to be free. Asked after the verdict: a board that
+      // was moved fits no stamps, either.
+      m.stop_for(Fault::kClockWrong);
     } else if (!m.settings().touch_points.empty()) {
       if (shows_touched_board(m)) {
         m.transition(StateId::kTouchTest);
