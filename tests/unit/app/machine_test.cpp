@@ -318,6 +318,17 @@ TEST_CASE("frames whose time the arm does not know are not a camera that stopped
   CHECK(world.ending.fault == Fault::kClockWrong);
 }
 
+TEST_CASE("stamps that fit no offset stop the job, unless the calibration is wrong by itself", "[machine]") {
+  ScriptedWorld world;
+  world.solve.stamps_wrong = true;
+  world.validate.accepted = GENERATE(true, false);
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end(600));
+  CHECK(world.ending.fault == (world.validate.accepted ? Fault::kClockWrong : Fault::kCalibrationRejected));
+  CHECK(world.ending.outcome == (world.validate.accepted ? Outcome::kSafelyStopped : Outcome::kCalibrationRejected));
+}
+
 TEST_CASE("frames on the way between calibration views are looked at, and nobody waits for them", "[machine]") {
   ScriptedWorld world;
   REQUIRE(world.run_until(StateId::kReady));
