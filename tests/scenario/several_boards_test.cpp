@@ -120,7 +120,7 @@ TEST_CASE("boards of the configuration hang where the cell has boards of their n
   const auto refused = folder.run({"run", "--config", "one.yaml", "--out", "a"});
   CHECK(refused.exit_code == 3);
   CHECK_THAT(refused.err, Catch::Contains("grid, checker, behind"));
-  folder.write("two.yaml", "cell: cell.yaml\nboards:\n  - {name: checker, type: charuco}\n  - {name: door}\n");
+  folder.write("two.yaml", "cell: cell.yaml\nboards:\n  - {name: checker}\n  - {name: door, type: apriltag}\n");
   CHECK_THAT(folder.run({"run", "--config", "two.yaml", "--out", "b"}).err, Catch::Contains("a board 'door'"));
 }
 
