@@ -15,8 +15,8 @@ namespace firstlook {
 using Quad = std::array<Eigen::Vector2d, 4>;
 
 /// All convex dark quadrangles with sides of at least `side_min_px`, rough (about a pixel), none twice. Local
-/// thresholds at two scales, contours, polygons. About 5 ms for 640x480; images wider than 1300 px are searched at half
-/// size.
+/// thresholds at three scales, outlines, polygons. About 5 ms for 640x480; images wider than 1300 px are searched at
+/// half size.
 /// @return kOutOfMemory
 [[nodiscard]] Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px = 10);
 

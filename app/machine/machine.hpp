@@ -59,7 +59,7 @@ struct Progress {
   std::uint32_t explore_views = 0;
   std::uint32_t replans = 0;        ///< in a row, without a view between
   std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
-  bool stamps_wrong = false;  ///< frames on the way fit no offset that is looked for
+  bool stamps_wrong = false;        ///< frames on the way fit no offset that is looked for
   bool calibration_accepted = false;
   FixedVector<TouchedPoint, kTouchPointsMax> touches;
   JointVector board_view_rad;  ///< where a board was seen first
