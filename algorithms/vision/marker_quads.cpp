@@ -146,7 +146,7 @@ Rises sum_rises(const Eigen::Vector2d& first, const Eigen::Vector2d& step, int s
 /// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
 std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t, double reach_px) {
   constexpr double kRiseMin = 8;  // grey levels, all rises together
-  const int steps = static_cast<int>(2 * reach_px / kEdgeStep_px + 0.5);
+  const int steps = static_cast<int>(std::lround(2 * reach_px / kEdgeStep_px));
   const double from_px = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
   const Eigen::Vector2d first = side.start + t * side.along + from_px * side.outward;
   const Eigen::Vector2d step = kEdgeStep_px * side.outward;
