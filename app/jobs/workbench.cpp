@@ -241,6 +241,10 @@ FreeSpace Workbench::space_of(MotionPhase phase) const {
   for (const Config::KeepOut& box : config_.keep_out) {
     space.keep_out_boxes.push_back({vector_of(box.low_m), vector_of(box.high_m)});
   }
+  // Also where the safe zone would call it free.
+  if (const GroundPlane ground = ground_of(config_); ground.tolerance_m > 0) {
+    space.keep_out_planes.push_back({Eigen::Vector3d::UnitZ(), ground.top_m()});
+  }
   return space;
 }
 

@@ -146,8 +146,9 @@ Status hang_boards(std::span<const NamedTarget> boards, Scene& scene) {
     if (place == scene.boards.end()) {
       std::vector<std::string> names;
       for (const BoardPlacement& placed : scene.boards) names.push_back(placed.name);
-      return failure(Fault::kConfigBadValue, "{}: no place for {}; the cell's boards are {}: list yours under 'boards'",
-                     scene.name, board.name.empty() ? "one board without a name" : "a board '" + board.name + "'",
+      return failure(Fault::kConfigBadValue,
+                     "{}: no place for {}; list yours under 'boards', by the names of the cell's: {}", scene.name,
+                     board.name.empty() ? "one board without a name" : "a board '" + board.name + "'",
                      fmt::join(names, ", "));
     }
     exchange_board(scene, board.board, static_cast<std::size_t>(place - scene.boards.begin()));

@@ -68,4 +68,15 @@ TEST_CASE("the plane fit and a ground that clears only", "[scenario]") {
   CHECK(fitted["mapping"]["voxels"]["occupied"].get<int>() < plain["mapping"]["voxels"]["occupied"].get<int>() / 2);
 }
 
+TEST_CASE("an arm that stands below the ground's top does not move", "[scenario]") {
+  const JobFolder folder;
+  folder.write("keys.yaml", "map: {ground_height_m: 0.3, ground_tolerance_m: 0.1}\n");
+  const ProgramResult run = folder.run_job("run", {"--config", "keys.yaml"});
+  INFO(run.err);
+  CHECK(run.exit_code == 6);
+  const Json result = folder.read_json("run/result.json");
+  check_safe(result);
+  CHECK(result["mapping"].is_null());
+}
+
 }  // namespace firstlook
