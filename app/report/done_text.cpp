@@ -7,9 +7,15 @@
 namespace firstlook {
 namespace {
 
+std::string boards_text(const HandEyeResult& h) {
+  const auto solved = std::ranges::count_if(h.targets, [](const TargetPose& target) { return target.views > 0; });
+  return solved > 1 ? fmt::format("{} boards", solved) : "the board";
+}
+
 std::string calibration_text(const HandEyeResult& h) {
-  return fmt::format("camera known to {:.2f} mm and {:.2f} mrad (1 sigma, worst axis) from {} views of the board",
-                     h.sigma_translation_m.maxCoeff() * 1e3, h.sigma_rotation_rad.maxCoeff() * 1e3, h.views);
+  return fmt::format("camera known to {:.2f} mm and {:.2f} mrad (1 sigma, worst axis) from {} views of {}",
+                     h.sigma_translation_m.maxCoeff() * 1e3, h.sigma_rotation_rad.maxCoeff() * 1e3, h.views,
+                     boards_text(h));
 }
 
 std::string verified_text(const HandEyeResult& h, const VerifiedCalibration& v) {

@@ -48,6 +48,7 @@ void check_result(const Json& result) {
   CHECK(result["truth"]["unknown_entries"] == 0);
   const auto scene = sim::parse_cell(kCell, "cell.yaml", 1).value();
   REQUIRE(hand_eye["targets"].size() == 3);
+  CHECK_THAT(std::string(result["reason"]), Catch::Contains("views of 3 boards"));
   REQUIRE(hand_eye["mutual_poses"].size() == 3);
   for (std::size_t k = 0; k < 3; ++k) {
     CHECK(hand_eye["targets"][k]["name"] == scene.boards[k].name);
