@@ -8,6 +8,7 @@
 #include "algorithms/vision/target_pattern.hpp"
 #include "hal/sim/body_image.hpp"
 #include "hal/sim/pixel_noise.hpp"
+#include "hal/sim/row_bands.hpp"
 
 namespace firstlook::sim {
 namespace {
@@ -36,10 +37,11 @@ struct Sample {
 class ColorFrame {
  public:
   ColorFrame(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
-             const Transform<Base, Camera>& base_T_camera, const Exposure& exposure)
+             const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, WorkerPool* workers)
       : scene_(scene),
         tracer_(tracer),
         rays_(rays),
+        workers_(workers),
         base_T_camera_(base_T_camera.pose()),
         body_(exposure.body, base_T_camera_, base_T_camera.translation()),
         noise_(exposure.seed, exposure.frame, kGrayNoise),
@@ -56,10 +58,12 @@ class ColorFrame {
     trace_centers();
     resample_edges();
     blur();
-    for (std::size_t i = 0; i < gray_.size(); ++i) {
-      const float noisy = gray_[i] + kNoiseSigma * normal_of(noise_.bits(i));
-      out.data[i] = static_cast<std::uint8_t>(std::clamp(std::floor(noisy + 0.5F), 0.0F, 255.0F));
-    }
+    for_rows([&](int r) {
+      for (std::size_t i = rays_.index(0, r), end = rays_.index(0, r + 1); i < end; ++i) {
+        const float noisy = gray_[i] + kNoiseSigma * normal_of(noise_.bits(i));
+        out.data[i] = static_cast<std::uint8_t>(std::clamp(std::floor(noisy + 0.5F), 0.0F, 255.0F));
+      }
+    });
   }
 
  private:
@@ -76,24 +80,32 @@ class ColorFrame {
     }
   };
 
+  template <typename Body>
+  void for_rows(Body body) const {
+    for_row_bands(workers_, rays_.camera.height, [&](int first, int last) {
+      for (int r = first; r < last; ++r) body(r);
+    });
+  }
+
   void aim(RayRow& row, std::size_t i, double x, double y) const {
     const Vector3d d = base_T_camera_.linear() * Vector3d(x, y, 1);
     row.x[i] = static_cast<float>(d.x()), row.y[i] = static_cast<float>(d.y()), row.z[i] = static_cast<float>(d.z());
   }
 
   void trace_centers() {
-    const auto width = static_cast<std::size_t>(rays_.camera.width);
-    RayRow row(width);
-    for (int r = 0; r < rays_.camera.height; ++r) {
-      const std::size_t first = rays_.index(0, r);
-      for (std::size_t i = 0; i < width; ++i) aim(row, i, rays_.x[first + i], rays_.y[first + i]);
-      tracer_.trace(base_T_camera_.translation(), row, width);
-      for (std::size_t i = 0; i < width; ++i) {
-        const Sample sample = look(row, i, rays_.x[first + i], rays_.y[first + i]);
-        gray_[first + i] = sample.gray;
-        seen_[first + i] = sample.seen;
+    for_row_bands(workers_, rays_.camera.height, [&](int first_row, int last_row) {
+      RayRow row(static_cast<std::size_t>(rays_.camera.width));
+      for (int r = first_row; r < last_row; ++r) {
+        const std::size_t first = rays_.index(0, r);
+        for (std::size_t i = 0; i < row.size(); ++i) aim(row, i, rays_.x[first + i], rays_.y[first + i]);
+        tracer_.trace(base_T_camera_.translation(), row, row.size());
+        for (std::size_t i = 0; i < row.size(); ++i) {
+          const Sample sample = look(row, i, rays_.x[first + i], rays_.y[first + i]);
+          gray_[first + i] = sample.gray;
+          seen_[first + i] = sample.seen;
+        }
       }
-    }
+    });
   }
 
   [[nodiscard]] const SeenBoard* board_of(std::size_t solid) const {
@@ -153,14 +165,16 @@ class ColorFrame {
 
   void resample_edges() {
     std::vector<float> resampled = gray_;
-    RayRow row(kTracedSamples * kTracedSamples);
-    for (int r = 0; r < rays_.camera.height; ++r) {
-      for (int c = 0; c < rays_.camera.width; ++c) {
-        const Around what = around(c, r);
-        if (what == Around::kBoard) resampled[rays_.index(c, r)] = integrate_board(c, r);
-        if (what == Around::kEdge) resampled[rays_.index(c, r)] = integrate_traced(c, r, row);
+    for_row_bands(workers_, rays_.camera.height, [&](int first, int last) {
+      RayRow row(kTracedSamples * kTracedSamples);
+      for (int r = first; r < last; ++r) {
+        for (int c = 0; c < rays_.camera.width; ++c) {
+          const Around what = around(c, r);
+          if (what == Around::kBoard) resampled[rays_.index(c, r)] = integrate_board(c, r);
+          if (what == Around::kEdge) resampled[rays_.index(c, r)] = integrate_traced(c, r, row);
+        }
       }
-    }
+    });
     gray_ = std::move(resampled);
   }
 
@@ -227,7 +241,7 @@ class ColorFrame {
   void pass(const std::array<float, 5>& taps, int dc, int dr, const std::vector<float>& from,
             std::vector<float>& to) const {
     const int width = rays_.camera.width, height = rays_.camera.height;
-    for (int r = 0; r < height; ++r) {
+    for_rows([&](int r) {
       for (int c = 0; c < width; ++c) {
         float sum = 0;
         for (int k = -2; k <= 2; ++k) {
@@ -236,12 +250,13 @@ class ColorFrame {
         }
         to[rays_.index(c, r)] = sum;
       }
-    }
+    });
   }
 
   const Scene& scene_;
   const RayTracer& tracer_;
   const PixelRays& rays_;
+  WorkerPool* const workers_;
   const Pose base_T_camera_;
   std::vector<SeenBoard> boards_;
   const BodyImage body_;
@@ -262,8 +277,9 @@ double shade(const Light& light, double reflectance, const Vector3d& point_m, co
 }
 
 void render_color_image(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
-                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out) {
-  ColorFrame(scene, tracer, rays, base_T_camera, exposure).render(out);
+                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out,
+                        WorkerPool* workers) {
+  ColorFrame(scene, tracer, rays, base_T_camera, exposure, workers).render(out);
 }
 
 }  // namespace firstlook::sim

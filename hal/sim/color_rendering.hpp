@@ -4,6 +4,7 @@
 #include "hal/sim/pixel_rays.hpp"
 #include "hal/sim/ray_tracer.hpp"
 #include "hal/sim/renderer.hpp"
+#include "platform/loop/worker_pool.hpp"
 
 namespace firstlook::sim {
 
@@ -14,8 +15,10 @@ namespace firstlook::sim {
 [[nodiscard]] double shade(const Light& light, double reflectance, const Eigen::Vector3d& point_m,
                            const Eigen::Vector3d& normal);
 
-/// Fills `out`, which has the size of `rays.camera`: antialiased, blurred as by the lens, with noise, 8 bits.
+/// Fills `out`, which has the size of `rays.camera`: antialiased, blurred as by the lens, with noise, 8 bits. With
+/// `workers` its threads share the rows; the picture is the same.
 void render_color_image(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
-                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out);
+                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out,
+                        WorkerPool* workers = nullptr);
 
 }  // namespace firstlook::sim

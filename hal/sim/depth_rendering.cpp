@@ -7,6 +7,7 @@
 
 #include "hal/sim/body_image.hpp"
 #include "hal/sim/pixel_noise.hpp"
+#include "hal/sim/row_bands.hpp"
 
 namespace firstlook::sim {
 namespace {
@@ -38,17 +39,21 @@ class DepthFrame {
         std::sqrt(std::max(0.0, sigma_px * sigma_px - sensor.disparity_step_px * sensor.disparity_step_px / 12));
   }
 
-  void render(ImageView<std::uint16_t> out) {
-    const auto width = static_cast<std::size_t>(rays_.camera.width);
-    RayRow row(width);
-    std::vector<std::uint8_t> shaded(width);
-    for (int r = 0; r < rays_.camera.height; ++r) {
-      trace_row(r, row);
-      shade_row(r, row, shaded);
-    }
-    for (int r = 0; r < rays_.camera.height; ++r) {
-      for (int c = 0; c < rays_.camera.width; ++c) out.at(c, r) = measure(c, r);
-    }
+  void render(ImageView<std::uint16_t> out, WorkerPool* workers) {
+    const int width = rays_.camera.width, height = rays_.camera.height;
+    for_row_bands(workers, height, [&](int first, int last) {
+      RayRow row(static_cast<std::size_t>(width));
+      std::vector<std::uint8_t> shaded(row.size());
+      for (int r = first; r < last; ++r) {
+        trace_row(r, row);
+        shade_row(r, row, shaded);
+      }
+    });
+    for_row_bands(workers, height, [&](int first, int last) {
+      for (int r = first; r < last; ++r) {
+        for (int c = 0; c < width; ++c) out.at(c, r) = measure(c, r);
+      }
+    });
   }
 
  private:
@@ -193,8 +198,8 @@ class DepthFrame {
 void render_depth_image(const Scene& scene, const RayTracer& tracer, const DepthSensorModel& sensor,
                         const PixelRays& rays, const CameraIntrinsics& full_camera,
                         const Transform<Base, Depth>& base_T_depth, const Exposure& exposure,
-                        ImageView<std::uint16_t> out) {
-  DepthFrame(scene, tracer, sensor, rays, full_camera, base_T_depth, exposure).render(out);
+                        ImageView<std::uint16_t> out, WorkerPool* workers) {
+  DepthFrame(scene, tracer, sensor, rays, full_camera, base_T_depth, exposure).render(out, workers);
 }
 
 }  // namespace firstlook::sim

@@ -45,21 +45,23 @@ DepthSensorModel depth_sensor_model(const SensorPreset& preset) {
 }
 
 struct Renderer::State {
-  State(const Scene& s, const DepthSensorModel& d)
+  State(const Scene& s, const DepthSensorModel& d, WorkerPool* w)
       : scene(s),
         sensor(d),
+        workers(w),
         tracer(s),
         color(s.mount.color),
         depth(s.mount.depth),
         fast(binned(s.mount.depth, kFastBinning)) {}
   Scene scene;
   DepthSensorModel sensor;
+  WorkerPool* workers;
   RayTracer tracer;
   PixelRays color, depth, fast;
 };
 
-Renderer::Renderer(const Scene& scene, const DepthSensorModel& sensor)
-    : state_(std::make_unique<State>(scene, sensor)) {}
+Renderer::Renderer(const Scene& scene, const DepthSensorModel& sensor, WorkerPool* workers)
+    : state_(std::make_unique<State>(scene, sensor, workers)) {}
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
@@ -74,7 +76,7 @@ const CameraIntrinsics& Renderer::depth_intrinsics(DepthDetail detail) const {
 void Renderer::render_color(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
                             MutableGrayImage out) const {
   ENSURE(5211, out.width == state_->color.camera.width && out.height == state_->color.camera.height);
-  render_color_image(state_->scene, state_->tracer, state_->color, base_T_camera, exposure, out);
+  render_color_image(state_->scene, state_->tracer, state_->color, base_T_camera, exposure, out, state_->workers);
 }
 
 void Renderer::render_depth(const Transform<Base, Depth>& base_T_depth, const Exposure& exposure, DepthDetail detail,
@@ -82,7 +84,7 @@ void Renderer::render_depth(const Transform<Base, Depth>& base_T_depth, const Ex
   const PixelRays& rays = detail == DepthDetail::kFull ? state_->depth : state_->fast;
   ENSURE(5212, out.width == rays.camera.width && out.height == rays.camera.height);
   render_depth_image(state_->scene, state_->tracer, state_->sensor, rays, state_->depth.camera, base_T_depth, exposure,
-                     out);
+                     out, state_->workers);
 }
 
 double Renderer::ray_m(const Vector3d& origin_m, const Vector3d& direction) const {

@@ -11,6 +11,7 @@
 #include "hal/api/cameras.hpp"
 #include "hal/sim/scene.hpp"
 #include "platform/core/image_view.hpp"
+#include "platform/loop/worker_pool.hpp"
 
 namespace firstlook::sim {
 
@@ -50,11 +51,11 @@ struct Overview {
   std::vector<std::uint8_t> rgb;  ///< row-major, three bytes for each pixel
 };
 
-/// Renders the scene that it was built from (copied); build another one when the scene changes. All calls are const,
-/// thread-safe and single-threaded inside (Embree, AVX2).
+/// Renders the scene that it was built from (copied); build another one when the scene changes. All calls are const and
+/// thread-safe (Embree, AVX2). The threads of `workers`, which must outlive it, share the rows of a camera's image.
 class Renderer {
  public:
-  explicit Renderer(const Scene& scene, const DepthSensorModel& sensor = {});
+  explicit Renderer(const Scene& scene, const DepthSensorModel& sensor = {}, WorkerPool* workers = nullptr);
   ~Renderer();
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;

@@ -85,11 +85,12 @@ void SceneWorld::matter(const GridGeometry& geometry, std::vector<std::uint8_t>&
   out = occupied_voxels(renderer_.scene(), geometry);
 }
 
-SceneHistory::SceneHistory(const Scene& scene, const DepthSensorModel& sensor, const Faults& faults) {
+SceneHistory::SceneHistory(const Scene& scene, const DepthSensorModel& sensor, const Faults& faults,
+                           WorkerPool* workers) {
   Scene now = scene;
   if (faults.camera_fixed) fix_camera(now);
   if (faults.board_absent) hide_boards(now);
-  spans_.push_back(std::make_unique<SceneSpan>(Instant{}, now, sensor));
+  spans_.push_back(std::make_unique<SceneSpan>(Instant{}, now, sensor, workers));
   struct Change {
     double at_s;
     void (*apply)(Scene&, const Faults&);
@@ -99,7 +100,7 @@ SceneHistory::SceneHistory(const Scene& scene, const DepthSensorModel& sensor, c
   for (const Change& change : changes) {
     if (!std::isfinite(change.at_s)) continue;
     change.apply(now, faults);
-    spans_.push_back(std::make_unique<SceneSpan>(Instant{seconds(change.at_s).ns}, now, sensor));
+    spans_.push_back(std::make_unique<SceneSpan>(Instant{seconds(change.at_s).ns}, now, sensor, workers));
   }
 }
 

@@ -34,14 +34,14 @@ struct SceneSpan {
   Renderer renderer;
   SceneWorld world;
 
-  SceneSpan(Instant begin, const Scene& scene, const DepthSensorModel& sensor)
-      : from(begin), renderer(scene, sensor), world(renderer) {}
+  SceneSpan(Instant begin, const Scene& scene, const DepthSensorModel& sensor, WorkerPool* workers)
+      : from(begin), renderer(scene, sensor, workers), world(renderer) {}
 };
 
 class SceneHistory {
  public:
   /// The scene with the faults that change it: board absent, camera beside the arm, board moved, obstacle.
-  SceneHistory(const Scene& scene, const DepthSensorModel& sensor, const Faults& faults);
+  SceneHistory(const Scene& scene, const DepthSensorModel& sensor, const Faults& faults, WorkerPool* workers = nullptr);
   /// The scene at an instant. Thread-safe.
   [[nodiscard]] const SceneSpan& at(Instant stamp) const;
 

@@ -124,7 +124,6 @@ Truth truth_of(const Scene& scene, const ArmModel& model, const SceneSpan& span,
   truth.color_clock_s = faults.color_clock_offset_s;
   truth.depth_clock_s = faults.depth_clock_offset_s;
   truth.seed = options.seed;
-  truth.workers = options.workers;
   return truth;
 }
 
@@ -164,11 +163,12 @@ class Cell final : public SimulatedCell {
  public:
   Cell(const Scene& loaded, const DepthSensorModel& sensor, const ArmModel& model, const Faults& faults,
        const SimulationOptions& options)
-      : scenes_(loaded, sensor, faults),
+      : workers_(options.workers),
+        scenes_(loaded, sensor, faults, &workers_),
         first_(scenes_.at(Instant{})),
         scene_(first_.renderer.scene()),
         description_(describe_cell(scene_, first_.renderer, faults, options)),
-        grader_(truth_of(scene_, model, first_, faults, options)),
+        grader_(truth_of(scene_, model, first_, faults, options), workers_),
         watcher_(grader_.monitor(), scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
         rig_(model, scene_.mount, arm_),
@@ -187,6 +187,7 @@ class Cell final : public SimulatedCell {
   [[nodiscard]] Grader& grader() override { return grader_; }
 
  private:
+  WorkerPool workers_;
   SceneHistory scenes_;
   const SceneSpan& first_;
   const Scene& scene_;

@@ -25,7 +25,7 @@ struct SimulationOptions {
   std::uint64_t seed = 1;         ///< of noise, deviations, faults and the true mount
   bool fast_sensor = false;       ///< coarser depth, corners instead of pixels
   std::string faults;             ///< faults.hpp
-  int workers = 2;                ///< threads of the observable set; results do not depend on it
+  int workers = 2;                ///< threads that render and grade; results do not depend on it
   /// What the job looks for: each hangs in place of the cell's board of its name, one without a name in place of the
   /// only one. Empty: the cell's own boards. The colour camera counts them in this order.
   std::vector<NamedTarget> boards{};

@@ -41,11 +41,11 @@ bool any_around(const GridGeometry& geometry, const Eigen::Vector3i& voxel, std:
 
 }  // namespace
 
-TruthGrader::TruthGrader(const Truth& truth)
+TruthGrader::TruthGrader(const Truth& truth, WorkerPool& workers)
     : truth_(truth),
       monitor_(truth.arm, true_capsules(truth.arm, truth.link, truth.link_T_camera), base_allowance(truth.arm),
                truth.space.zone, *truth.world),
-      workers_(truth.workers) {}
+      workers_(workers) {}
 
 void TruthGrader::watch(const KnownFreeView* view) {
   const memory::SimulationScope simulation;

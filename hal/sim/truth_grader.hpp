@@ -19,7 +19,7 @@ struct NamedRegion {
   Eigen::Vector3d high_m = Eigen::Vector3d::Zero();
 };
 
-/// The truth that a grader knows. The world must outlive it.
+/// The truth that a grader knows. The world and the threads must outlive it.
 struct Truth {
   ArmModel arm;
   const TrueWorld* world = nullptr;
@@ -32,12 +32,12 @@ struct Truth {
   JointVector start_rad;
   std::vector<NamedRegion> regions;
   std::uint64_t seed = 1;
-  int workers = 2;
 };
 
 class TruthGrader final : public Grader {
  public:
-  explicit TruthGrader(const Truth& truth);
+  /// The threads compute what could be observed.
+  TruthGrader(const Truth& truth, WorkerPool& workers);
 
   [[nodiscard]] ContactMonitor& monitor() { return monitor_; }
 
@@ -62,7 +62,7 @@ class TruthGrader final : public Grader {
 
   Truth truth_;
   ContactMonitor monitor_;
-  WorkerPool workers_;
+  WorkerPool& workers_;
   struct Known {
     GridGeometry geometry;
     ObservableOptions options;

@@ -20,7 +20,6 @@ Truth truth_in(const TrueWorld& world) {
   truth.link_T_camera = Eigen::Translation3d(0, -0.06, 0.05) * Pose(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()));
   truth.depth = {640, 480, 589, 609, 319.5, 239.5};
   truth.start_rad = default_start(truth.arm);
-  truth.workers = 1;
   return truth;
 }
 
@@ -37,7 +36,8 @@ GridGeometry coarse_grid() { return GridGeometry::covering({-1.5, -1.5, -0.3}, {
 
 TEST_CASE("hand-eye errors and the normalised error of a known perturbation", "[sim][grader]") {
   const BoxWorld world;
-  TruthGrader grader(truth_in(world));
+  WorkerPool workers(1);
+  TruthGrader grader(truth_in(world), workers);
   const Pose truth = grader.true_flange_T_camera().pose();
   const Eigen::Vector3d turn_rad(0.001, -0.002, 0.002), shift_m(0.0003, 0, -0.0004);
   Pose estimate = truth;
@@ -57,7 +57,8 @@ TEST_CASE("hand-eye errors and the normalised error of a known perturbation", "[
 
 TEST_CASE("the normalised error of honest estimates has six degrees of freedom", "[sim][grader]") {
   const BoxWorld world;
-  TruthGrader grader(truth_in(world));
+  WorkerPool workers(1);
+  TruthGrader grader(truth_in(world), workers);
   const Pose truth = grader.true_flange_T_camera().pose();
   Random random(4);
   Matrix6d root = Matrix6d::Zero();
@@ -84,7 +85,8 @@ TEST_CASE("the normalised error of honest estimates has six degrees of freedom",
 
 TEST_CASE("a covariance that is not positive has no normalised error", "[sim][grader]") {
   const BoxWorld world;
-  TruthGrader grader(truth_in(world));
+  WorkerPool workers(1);
+  TruthGrader grader(truth_in(world), workers);
   FinalClaims claims;
   claims.flange_T_camera = grader.true_flange_T_camera();
   CHECK_FALSE(grader.grade(claims).hand_eye_mahalanobis2.has_value());
@@ -97,7 +99,8 @@ TEST_CASE("coverage counts observable voxels that the map knows, false free thos
   Truth truth = truth_in(world);
   truth.regions.push_back({"left half", {-1.2, -1.2, -0.2}, {0, 1.2, 1.4}});
   truth.regions.push_back({"right half", {0, -1.2, -0.2}, {1.2, 1.2, 1.4}});
-  TruthGrader grader(truth);
+  WorkerPool workers(1);
+  TruthGrader grader(truth, workers);
   VoxelMap map(coarse_grid());
   FinalClaims claims;
   claims.map = &map;
@@ -128,7 +131,8 @@ TEST_CASE("coverage counts observable voxels that the map knows, false free thos
 TEST_CASE("false occupied counts voxels away from every surface, inside the reach zone only", "[sim][grader]") {
   BoxWorld world;
   world.add_room({-1.2, -1.2, -0.2}, {1.2, 1.2, 1.4});
-  TruthGrader grader(truth_in(world));
+  WorkerPool workers(1);
+  TruthGrader grader(truth_in(world), workers);
   VoxelMap map(coarse_grid());
   const GridGeometry& g = map.geometry();
   std::vector<std::uint8_t> zone(map.size());

@@ -156,6 +156,31 @@ TEST_CASE("a depth image depends on seed and frame alone") {
   CHECK(first == in_thread);
 }
 
+TEST_CASE("pictures are the same whatever the number of threads that share their rows") {
+  const Result<Scene> scene = load_cell("workshop", 1);
+  REQUIRE(scene);
+  const ArmModel arm = *find_arm_model(scene->arm_model);
+  const std::vector<JointVector> views = board_views(*scene, 60000, 1);
+  REQUIRE_FALSE(views.empty());
+  const LinkFrames frames = forward(arm, views[0]);
+  const Exposure exposure{place(true_body(arm), frames), 5, 9};
+  const Transform<Base, Camera> base_T_camera = frames.flange() * scene->mount.flange_T_camera();
+  const CameraIntrinsics& color = scene->mount.color;
+  std::vector<std::vector<std::uint8_t>> grays;
+  std::vector<std::vector<std::uint16_t>> depths;
+  WorkerPool one(1), three(3);
+  for (WorkerPool* const workers : {static_cast<WorkerPool*>(nullptr), &one, &three}) {
+    const Renderer renderer(*scene, {}, workers);
+    auto& gray = grays.emplace_back(static_cast<std::size_t>(color.width) * static_cast<std::size_t>(color.height));
+    renderer.render_color(base_T_camera, exposure, {gray.data(), color.width, color.height});
+    depths.push_back(depth_of(renderer, exposure, DepthDetail::kFull, base_T_camera * scene->mount.camera_T_depth));
+  }
+  CHECK(grays[1] == grays[0]);
+  CHECK(grays[2] == grays[0]);
+  CHECK(depths[1] == depths[0]);
+  CHECK(depths[2] == depths[0]);
+}
+
 TEST_CASE("rendered boards are found, and their corners are where the camera model puts them") {
   const Result<Scene> scene = load_cell("workshop", 2);
   REQUIRE(scene);
