@@ -48,7 +48,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   RunCommand run;
   ConfigFlags run_flags;
-  std::string only = "everything", sensor = "full", calibration, prior, views = "firstlook";
+  std::string only = "everything", sensor = "full", calibration, prior, views;
   CLI::App* run_app = app.add_subcommand("run", "the whole job or a part of it, in a simulated cell");
   run_flags.add_to(*run_app);
   run_app->add_option("--only", only, "a part of the job; map and verify test a stored calibration first")
@@ -57,11 +57,10 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                       "hand_eye.yaml of an earlier run, for --only map and --only verify");
   run_app->add_option("--prior-map", prior,
                       "an earlier map of the cell, .bt or .ot: where to look first, and what changed");
-  run_app->add_option("--views", views, "how the views for the map are chosen: firstlook is all there is")
-      ->check([](const std::string& name) {
-        return name == "firstlook" ? std::string()
-                                   : fmt::format("'{}' is not there; the views are chosen by: firstlook", name);
-      });
+  run_app
+      ->add_option("--views", views,
+                   "how the views for the map are chosen; thesis2014: as in the thesis of 2014, to measure against")
+      ->check(CLI::IsMember({"firstlook", "thesis2014"}));
   run_app->add_option("--sensor", sensor, "full pictures, or fast: coarser depth and projected corners")
       ->check(CLI::IsMember({"full", "fast"}));
   run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
@@ -190,6 +189,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       }
       run.sources.flags.push_back({"calibration.stored", calibration, "--calibration"});
     }
+    if (!views.empty()) run.sources.flags.push_back({"explore.views", views, "--views"});
     if (!prior.empty()) run.sources.flags.push_back({"map.prior", prior, "--prior-map"});
     run.fast_sensor = sensor == "fast";
     return {run, 0};

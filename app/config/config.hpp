@@ -151,6 +151,7 @@ struct Config {
     int certificate_samples = 1000;
     int cluster_voxels_min = 8;
     double frames_while_moving_hz = 2;
+    std::string views = "firstlook";  ///< firstlook | thesis2014
     bool operator==(const Explore&) const = default;
   } explore;
 

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::string_view kStartSources[] = {"pendant", "panel"};
 constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"};
+constexpr std::string_view kViews[] = {"firstlook", "thesis2014"};
 constexpr std::string_view kHoles[] = {"ignore", "clear_when_corroborated"};
 
 /// Every seed that a double of result.json's readers can hold exactly.
@@ -302,6 +303,8 @@ void add_map_keys(Keys& keys, Config& c) {
                   {},
                   "earlier map of the cell, .bt or .ot: hints where to look first, and nothing is known by it; none: "
                   "there is none"});
+  keys.push_back({"explore.views", &c.explore.views, 0, 0, kViews,
+                  "how views are chosen; thesis2014: as the thesis of 2014 did, a baseline to measure against"});
   keys.push_back({"explore.views_max", &c.explore.views_max, 1, 500, {}, "views to take at most"});
   keys.push_back({"explore.candidates", &c.explore.candidates, 10, 20000, {}, "configurations scored for each view"});
   keys.push_back({"explore.certificate_samples",

@@ -1,6 +1,7 @@
 /// Jobs that plan motion: certified paths, the sweep, the next best view.
 #include <algorithm>
 
+#include "algorithms/view_planning/thesis_views.hpp"
 #include "app/jobs/workbench.hpp"
 
 namespace firstlook {
@@ -123,8 +124,15 @@ NextViewResult Workbench::next_sweep_view(const FromHere& here) {
   return result;
 }
 
-NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
-  NextViewResult result;
+Result<ViewChoice> Workbench::choose_view(const ViewContext& view_context, const Pace& pace, const FromHere& here) {
+  if (config_.explore.views == "thesis2014") {
+    ThesisOptions options;
+    options.seed = static_cast<std::uint64_t>(config_.seed);
+    options.step = here.step;
+    options.limits = pace.limits;
+    options.trail = trail_;
+    return choose_as_thesis(view_context, here.at_rad, planner_, options);
+  }
   ExploreOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.step = here.step;
@@ -133,10 +141,14 @@ NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
   options.timing.limits = pace.limits;
   options.trail = trail_;
   options.timing.settle_s = config_.calibration.settle_time_s;
-  const ViewContext view_context = context(pace.plan);
-  const auto choice = chooser_.choose(view_context, here.at_rad, options, [this](int n, IndexedBody body) {
+  return chooser_.choose(view_context, here.at_rad, options, [this](int n, IndexedBody body) {
     workers_.parallel_for(n, [&body](int index, int worker) { body(index, worker); });
   });
+}
+
+NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
+  NextViewResult result;
+  const auto choice = choose_view(context(pace.plan), pace, here);
   if (!choice) {
     result.blocked = choice.error().fault == Fault::kStartBlocked;
     result.fault = choice.error().fault;

@@ -49,7 +49,8 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.see_on_the_way = config.calibration.time_offset == "estimate";
   s.depth_beside = config.calibration.depth == "estimate";
   s.explore_views_max = config.explore.views_max;
-  s.frames_while_moving_hz = config.explore.frames_while_moving_hz;
+  // The thesis's sensor was off while the arm moved and a map was loaded.
+  s.frames_while_moving_hz = config.explore.views == "thesis2014" ? 0 : config.explore.frames_while_moving_hz;
   set_touch_test(config, s);
   if (config.parking_rad) s.parking_rad = *config.parking_rad;
   return s;
