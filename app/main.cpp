@@ -66,6 +66,8 @@ class KnownFree final : public sim::KnownFreeView {
   [[nodiscard]] const GridGeometry& geometry() const override { return space_.geometry(); }
   [[nodiscard]] bool free_for_motion(std::size_t voxel) const override { return space_.free_for_motion(voxel); }
   [[nodiscard]] bool zone_revoked(std::size_t voxel) const override { return space_.zone_revoked(voxel); }
+  [[nodiscard]] bool known(std::size_t voxel) const override { return space_.known(voxel); }
+  [[nodiscard]] std::uint32_t revision() const override { return space_.revision(); }
 
  private:
   const PublishedSpace& space_;
@@ -131,6 +133,8 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
   truth.contacts = figures.contacts;
   truth.unknown_entries = figures.unknown_entries;
   truth.coverage_of_observable = figures.coverage_of_observable;
+  truth.known_95_s = figures.known_95_s;
+  truth.known_99_s = figures.known_99_s;
   truth.false_free_voxels = figures.false_free_voxels;
   truth.false_occupied_fraction = figures.false_occupied_fraction;
   if (claims.map == nullptr) return;

@@ -17,8 +17,8 @@ namespace firstlook {
 
 class PublishedSpace {
  public:
-  // What the published bytes say of a voxel.
-  static constexpr std::uint8_t kNotFreeVoxel = 0, kFreeVoxel = 1, kRevokedVoxel = 2;
+  // What the bits of the published bytes say of a voxel: free for motion; taken out of the safe zone; seen by the map.
+  static constexpr std::uint8_t kFreeVoxel = 1, kRevokedVoxel = 2, kKnownVoxel = 4;
 
   PublishedSpace(const GridGeometry& geometry, double distance_max_m)
       : next_field_(geometry, distance_max_m),
@@ -46,6 +46,7 @@ class PublishedSpace {
     const std::lock_guard lock(mutex_);
     if (!fresh_) return;
     fresh_ = false;
+    ++revision_;
     field_ = next_field_;
     space_ = next_space_;
     space_.field = has_field_ ? &field_ : nullptr;
@@ -66,8 +67,11 @@ class PublishedSpace {
   /// Whether there is a map; before, the safe zone's cylinder is all that is free. Loop thread.
   [[nodiscard]] bool mapped() const { return mapped_; }
   [[nodiscard]] const GridGeometry& geometry() const { return field_.geometry(); }
-  [[nodiscard]] bool free_for_motion(std::size_t voxel) const { return free_[voxel] == kFreeVoxel; }
-  [[nodiscard]] bool zone_revoked(std::size_t voxel) const { return free_[voxel] == kRevokedVoxel; }
+  [[nodiscard]] bool free_for_motion(std::size_t voxel) const { return (free_[voxel] & kFreeVoxel) != 0; }
+  [[nodiscard]] bool zone_revoked(std::size_t voxel) const { return (free_[voxel] & kRevokedVoxel) != 0; }
+  [[nodiscard]] bool known(std::size_t voxel) const { return (free_[voxel] & kKnownVoxel) != 0; }
+  /// Grows by one with each change of what is published.
+  [[nodiscard]] std::uint32_t revision() const { return revision_; }
   [[nodiscard]] const FreeSpace& space() const { return space_; }
 
  private:
@@ -75,6 +79,7 @@ class PublishedSpace {
   bool fresh_ = false;
   bool has_field_ = false;
   bool mapped_ = false;
+  std::uint32_t revision_ = 0;
   DistanceField next_field_, field_;
   DistanceField next_revoked_, revoked_;
   FreeSpace next_space_, space_;

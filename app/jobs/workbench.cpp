@@ -305,6 +305,7 @@ void Workbench::rebuild_free_space(double now_s) {
   mapping_space_ = space_of(MotionPhase::kMapping);
   for (std::size_t i = 0; i < free_mask_.size(); ++i) {
     if (free_mask_[i] == 0 && map_.zone_revoked(i)) free_mask_[i] = PublishedSpace::kRevokedVoxel;
+    if (map_.voxel_class(i) != VoxelClass::kUnknown) free_mask_[i] |= PublishedSpace::kKnownVoxel;
   }
   published_.publish(mapping_space_, camera_body_,
                      guardian_clearance(mapping_terms_->clearance(), mapping_terms_->stopping_m), free_mask_);

@@ -108,6 +108,8 @@ Json truth_json(const TruthRecord& truth) {
           {"contacts", truth.contacts},
           {"unknown_entries", truth.unknown_entries},
           {"coverage_of_observable", or_null(truth.coverage_of_observable)},
+          {"known_95_s", or_null(truth.known_95_s)},
+          {"known_99_s", or_null(truth.known_99_s)},
           {"false_free_voxels", or_null(truth.false_free_voxels)},
           {"false_occupied_fraction", or_null(truth.false_occupied_fraction)},
           {"regions", regions}};

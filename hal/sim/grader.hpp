@@ -28,6 +28,10 @@ class KnownFreeView {
   /// True where a hit has taken a voxel out of the safe zone. Elsewhere what lies inside the zone's cylinder is free,
   /// also where the cylinder cuts through a voxel.
   [[nodiscard]] virtual bool zone_revoked(std::size_t /*voxel*/) const { return true; }
+  /// True when the map says something of the voxel.
+  [[nodiscard]] virtual bool known(std::size_t voxel) const { return free_for_motion(voxel); }
+  /// Another number after each change of all this.
+  [[nodiscard]] virtual std::uint32_t revision() const { return 0; }
 };
 
 /// What a run ends with. Parts that were not reached stay empty.
@@ -66,6 +70,7 @@ struct TruthFigures {
   std::uint64_t contacts = 0;
   std::uint64_t unknown_entries = 0;
   std::optional<double> coverage_of_observable;
+  std::optional<double> known_95_s, known_99_s;  ///< when so many hundredths of what can be observed were known
   /// Known free for motion although the voxel's centre lies in matter: half a voxel of tolerance on either side.
   std::optional<std::uint64_t> false_free_voxels;
   /// Share of the reach zone's voxels that are occupied although neither they nor a neighbour (26 of them: a surface

@@ -21,18 +21,19 @@ constexpr Duration kDepthPeriod{1'000'000'000 / 30};
 constexpr Instant kColorFirst{milliseconds(10).ns};
 constexpr Instant kDepthFirst{milliseconds(5).ns};
 
-/// Hands the body's motion to the monitor together with the world of that moment.
-class MonitorInTime final : public BodyWatcher {
+/// Hands the body's motion to the grader together with the world of that moment.
+class GraderInTime final : public BodyWatcher {
  public:
-  MonitorInTime(ContactMonitor& monitor, const SceneHistory& scenes) : monitor_(monitor), scenes_(scenes) {}
+  GraderInTime(TruthGrader& grader, const SceneHistory& scenes) : grader_(grader), scenes_(scenes) {}
   bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) override {
-    monitor_.set_world(scenes_.at(stamp).world);
-    return monitor_.body_moved(stamp, from_rad, to_rad);
+    grader_.known_times().note(stamp);
+    grader_.monitor().set_world(scenes_.at(stamp).world);
+    return grader_.monitor().body_moved(stamp, from_rad, to_rad);
   }
-  void body_led() override { monitor_.body_led(); }
+  void body_led() override { grader_.monitor().body_led(); }
 
  private:
-  ContactMonitor& monitor_;
+  TruthGrader& grader_;
   const SceneHistory& scenes_;
 };
 
@@ -169,7 +170,7 @@ class Cell final : public SimulatedCell {
         scene_(first_.renderer.scene()),
         description_(describe_cell(scene_, first_.renderer, faults, options)),
         grader_(truth_of(scene_, model, first_, faults, options), workers_),
-        watcher_(grader_.monitor(), scenes_),
+        watcher_(grader_, scenes_),
         arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
         rig_(model, scene_.mount, arm_),
         color_(color_timing(faults, options.seed), arm_, rig_, scenes_, description_.color, options.fast_sensor),
@@ -193,7 +194,7 @@ class Cell final : public SimulatedCell {
   const Scene& scene_;
   CellDescription description_;
   TruthGrader grader_;
-  MonitorInTime watcher_;
+  GraderInTime watcher_;
   SimulatedArm arm_;
   CameraRig rig_;
   SimulatedColorCamera color_;

@@ -50,6 +50,7 @@ TruthGrader::TruthGrader(const Truth& truth, WorkerPool& workers)
 void TruthGrader::watch(const KnownFreeView* view) {
   const memory::SimulationScope simulation;
   monitor_.watch(view);
+  known_times_.watch(view);
 }
 
 const ObservableSet& TruthGrader::observable(const GridGeometry& geometry, const ObservableOptions& options) {
@@ -128,6 +129,8 @@ void TruthGrader::grade_map(const FinalClaims& claims, TruthFigures& figures) {
     }
   }
   figures.observable_voxels = set.voxels;
+  figures.known_95_s = known_times_.time_s(set.seen, 0.95);
+  figures.known_99_s = known_times_.time_s(set.seen, 0.99);
   if (set.voxels > 0) figures.coverage_of_observable = static_cast<double>(known) / static_cast<double>(set.voxels);
   figures.false_free_voxels = false_free;
   figures.false_occupied_fraction = false_occupied_fraction(claims);

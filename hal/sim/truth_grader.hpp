@@ -7,6 +7,7 @@
 
 #include "hal/sim/contacts.hpp"
 #include "hal/sim/grader.hpp"
+#include "hal/sim/known_times.hpp"
 #include "hal/sim/true_world.hpp"
 #include "platform/loop/worker_pool.hpp"
 
@@ -40,6 +41,7 @@ class TruthGrader final : public Grader {
   TruthGrader(const Truth& truth, WorkerPool& workers);
 
   [[nodiscard]] ContactMonitor& monitor() { return monitor_; }
+  [[nodiscard]] KnownTimes& known_times() { return known_times_; }
 
   void watch(const KnownFreeView* view) override;
   [[nodiscard]] std::uint64_t contacts() const override { return monitor_.contacts(); }
@@ -62,6 +64,7 @@ class TruthGrader final : public Grader {
 
   Truth truth_;
   ContactMonitor monitor_;
+  KnownTimes known_times_;
   WorkerPool& workers_;
   struct Known {
     GridGeometry geometry;

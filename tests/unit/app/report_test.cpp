@@ -94,7 +94,8 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2",
                                        "depth_camera_error_mm", "depth_camera_error_mrad", "color_stamps_error_s",
                                        "depth_stamps_error_s", "contacts", "unknown_entries", "coverage_of_observable",
-                                       "false_free_voxels", "false_occupied_fraction", "regions"});
+                                       "known_95_s", "known_99_s", "false_free_voxels", "false_occupied_fraction",
+                                       "regions"});
 }
 
 TEST_CASE("what was found of depth camera and stamps is told, and what was not", "[report]") {
