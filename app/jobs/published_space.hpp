@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "algorithms/motion/body.hpp"
@@ -47,17 +48,17 @@ class PublishedSpace {
     if (!fresh_) return;
     fresh_ = false;
     ++revision_;
-    field_ = next_field_;
+    std::swap(field_, next_field_);  // publish() writes it anew
     space_ = next_space_;
     space_.field = has_field_ ? &field_ : nullptr;
     if (space_.revoked != nullptr) {
-      revoked_ = next_revoked_;
+      std::swap(revoked_, next_revoked_);
       space_.revoked = &revoked_;
     }
     mapped_ = has_field_;
     body_ = next_body_;
     clearance_ = next_clearance_;
-    free_ = next_free_;
+    free_.swap(next_free_);
   }
 
   /// The guardian's verdict on a configuration; loop thread.

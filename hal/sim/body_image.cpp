@@ -40,10 +40,13 @@ BodyImage::BodyImage(const Capsules& body, const Pose& base_T_eye, const Eigen::
     if (segment_distance_m(a, b, other, other) <= capsule.radius_m) continue;
     if (std::max(a.z(), b.z()) + capsule.radius_m <= 0) continue;  // behind
     Part part;
-    part.a = a;
+    part.a = a, part.b = b;
     part.length_m = (b - a).norm();
     part.axis = part.length_m > 0 ? Eigen::Vector3d((b - a) / part.length_m) : Eigen::Vector3d::UnitX();
     part.radius_m = capsule.radius_m;
+    part.a_along = a.dot(part.axis);
+    part.offset = a - part.a_along * part.axis;
+    part.eye_outside = part.offset.squaredNorm() - part.radius_m * part.radius_m;
     part.x_low = part.y_low = kWide, part.x_high = part.y_high = -kWide;
     if (std::min(a.z(), b.z()) > capsule.radius_m) {
       // A capsule is the convex hull of its two end spheres, and so is its picture of theirs.
@@ -68,19 +71,16 @@ bool BodyImage::intersect(double x, double y, double before_m, BodyHit& hit) con
   for (const Part& part : parts_) {
     if (x < part.x_low || x > part.x_high || y < part.y_low || y > part.y_high) continue;
     // The side, a quadratic across the axis; where it ends, the end spheres.
-    const double d_along = d.dot(part.axis), a_along = part.a.dot(part.axis);
-    const Eigen::Vector3d across = d - d_along * part.axis, offset = part.a - a_along * part.axis;
-    const double aa = across.squaredNorm(), bb = across.dot(offset);
-    const double discriminant = bb * bb - aa * (offset.squaredNorm() - part.radius_m * part.radius_m);
+    const double d_along = d.dot(part.axis), aa = d.squaredNorm() - d_along * d_along, bb = d.dot(part.offset);
+    const double discriminant = bb * bb - aa * part.eye_outside;
     double t = kWide;
     if (aa > 1e-12) {
       if (discriminant < 0) continue;
       t = (bb - std::sqrt(discriminant)) / aa;
-      const double at = t * d_along - a_along;
+      const double at = t * d_along - part.a_along;
       if (!(t > 0) || at < 0 || at > part.length_m) t = kWide;
     }
-    const Eigen::Vector3d b = part.a + part.length_m * part.axis;
-    if (t == kWide) t = std::min(sphere(part.a, part.radius_m, d), sphere(b, part.radius_m, d));
+    if (t == kWide) t = std::min(sphere(part.a, part.radius_m, d), sphere(part.b, part.radius_m, d));
     if (!(t < before_m)) continue;
     before_m = t;
     found = true;

@@ -28,8 +28,10 @@ class BodyImage {
 
  private:
   struct Part {
-    Eigen::Vector3d a, axis;  ///< one end and the unit direction to the other
+    Eigen::Vector3d a, b, axis;  ///< the ends and the unit direction from a to b
     double length_m = 0, radius_m = 0;
+    Eigen::Vector3d offset;               ///< of the axis from the eye, where it is nearest
+    double a_along = 0, eye_outside = 0;  ///< a along the axis; squared distance of the axis less squared radius
     double x_low = 0, x_high = 0, y_low = 0, y_high = 0;  ///< outline in normalised image coordinates
   };
   std::vector<Part> parts_;
