@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "app/jobs/published_space.hpp"
 #include "app/machine/events.hpp"
@@ -31,7 +33,7 @@ class ArmSource final : public EventSource {
     while (queue.free_slots() > kReserved) {
       const auto state = device_.poll(now);
       if (!state) break;
-      const GuardianVerdict verdict = space_.judge(model_, state->position_rad);
+      const GuardianVerdict& verdict = judge(state->position_rad);
       if (state->moving) {
         double& least_m = space_.mapped() ? least_mapping_m_ : least_calibrating_m_;
         least_m = std::min(least_m, verdict.distance_m);
@@ -46,7 +48,21 @@ class ArmSource final : public EventSource {
   [[nodiscard]] double least_distance_mapping_m() const { return least_mapping_m_; }
 
  private:
+  /// The guardian's finding. An arm that stands still in a space that does not change needs no second one.
+  const GuardianVerdict& judge(const JointVector& at_rad) {
+    if (!judged_ || judged_->revision != space_.revision() || !(judged_->at_rad == at_rad)) {
+      judged_ = Judged{at_rad, space_.revision(), space_.judge(model_, at_rad)};
+    }
+    return judged_->verdict;
+  }
+
+  struct Judged {
+    JointVector at_rad;
+    std::uint32_t revision = 0;  ///< of the published space
+    GuardianVerdict verdict;
+  };
   static constexpr std::size_t kReserved = 16;  // slots for the other sources of a turn
+  std::optional<Judged> judged_;
   double least_calibrating_m_ = std::numeric_limits<double>::infinity();
   double least_mapping_m_ = std::numeric_limits<double>::infinity();
   hal::RobotArm& device_;

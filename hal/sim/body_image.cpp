@@ -39,7 +39,7 @@ BodyImage::BodyImage(const Capsules& body, const Pose& base_T_eye, const Eigen::
     if (segment_distance_m(a, b, eye, eye) <= capsule.radius_m) continue;
     if (segment_distance_m(a, b, other, other) <= capsule.radius_m) continue;
     if (std::max(a.z(), b.z()) + capsule.radius_m <= 0) continue;  // behind
-    Part part;
+    BodyPart part;
     part.a = a, part.b = b;
     part.length_m = (b - a).norm();
     part.axis = part.length_m > 0 ? Eigen::Vector3d((b - a) / part.length_m) : Eigen::Vector3d::UnitX();
@@ -57,18 +57,29 @@ BodyImage::BodyImage(const Capsules& body, const Pose& base_T_eye, const Eigen::
     } else {
       part.x_low = part.y_low = -kWide, part.x_high = part.y_high = kWide;
     }
-    parts_.push_back(part);
+    add(part);
   }
 }
 
-bool BodyImage::in_row(double y) const {
-  return std::ranges::any_of(parts_, [y](const Part& part) { return y >= part.y_low && y <= part.y_high; });
+void BodyImage::add(const BodyPart& part) {
+  x_low_ = parts_.empty() ? part.x_low : std::min(x_low_, part.x_low);
+  x_high_ = parts_.empty() ? part.x_high : std::max(x_high_, part.x_high);
+  parts_.push_back(part);
+}
+
+BodyImage BodyImage::band(double y_low, double y_high) const {
+  BodyImage band;
+  for (const BodyPart& part : parts_) {
+    if (y_high >= part.y_low && y_low <= part.y_high) band.add(part);
+  }
+  return band;
 }
 
 bool BodyImage::intersect(double x, double y, double before_m, BodyHit& hit) const {
+  if (!(x >= x_low_ && x <= x_high_)) return false;
   bool found = false;
   const Eigen::Vector3d d(x, y, 1);
-  for (const Part& part : parts_) {
+  for (const BodyPart& part : parts_) {
     if (x < part.x_low || x > part.x_high || y < part.y_low || y > part.y_high) continue;
     // The side, a quadratic across the axis; where it ends, the end spheres.
     const double d_along = d.dot(part.axis), aa = d.squaredNorm() - d_along * d_along, bb = d.dot(part.offset);

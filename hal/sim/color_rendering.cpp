@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "algorithms/vision/target_pattern.hpp"
@@ -97,10 +98,12 @@ class ColorFrame {
       RayRow row(static_cast<std::size_t>(rays_.camera.width));
       for (int r = first_row; r < last_row; ++r) {
         const std::size_t first = rays_.index(0, r);
+        const auto [low, high] = std::ranges::minmax(std::span(rays_.y).subspan(first, row.size()));
+        const BodyImage body = body_.band(low, high);
         for (std::size_t i = 0; i < row.size(); ++i) aim(row, i, rays_.x[first + i], rays_.y[first + i]);
         tracer_.trace(base_T_camera_.translation(), row, row.size());
         for (std::size_t i = 0; i < row.size(); ++i) {
-          const Sample sample = look(row, i, rays_.x[first + i], rays_.y[first + i]);
+          const Sample sample = look(body, row, i, rays_.x[first + i], rays_.y[first + i]);
           gray_[first + i] = sample.gray;
           seen_[first + i] = sample.seen;
         }
@@ -126,9 +129,9 @@ class ColorFrame {
   }
 
   /// What ray i of the row, which is (x, y, 1) of the camera, has met.
-  [[nodiscard]] Sample look(const RayRow& row, std::size_t i, double x, double y) const {
+  [[nodiscard]] Sample look(const BodyImage& body, const RayRow& row, std::size_t i, double x, double y) const {
     BodyHit hit;
-    if (!body_.empty() && body_.intersect(x, y, row.t[i], hit)) {
+    if (body.intersect(x, y, row.t[i], hit)) {
       const Vector3d point = base_T_camera_ * Vector3d(hit.depth_m * Vector3d(x, y, 1));
       return {brightness(kBodyReflectance, point, base_T_camera_.linear() * hit.normal), kBody};
     }
@@ -220,7 +223,7 @@ class ColorFrame {
     });
     tracer_.trace(base_T_camera_.translation(), row, count);
     float sum = 0;
-    for (std::size_t i = 0; i < count; ++i) sum += look(row, i, at[i][0], at[i][1]).gray;
+    for (std::size_t i = 0; i < count; ++i) sum += look(body_, row, i, at[i][0], at[i][1]).gray;
     return sum / static_cast<float>(count);
   }
 

@@ -74,7 +74,7 @@ class DepthFrame {
       row.z[i] = rotation(2, 0) * x + rotation(2, 1) * y + rotation(2, 2);
     }
     tracer_.trace(base_T_depth_.translation(), row, row.size());
-    const bool body = camera_body_.in_row(rays_.y[first]);  // without distortion a row has one height
+    const BodyImage body = camera_body_.band(rays_.y[first], rays_.y[first]);  // undistorted: a row has one height
     for (std::size_t i = 0; i < row.size(); ++i) {
       const float length = std::sqrt(row.x[i] * row.x[i] + row.y[i] * row.y[i] + row.z[i] * row.z[i]);
       float cosine = -(row.nx[i] * row.x[i] + row.ny[i] * row.y[i] + row.nz[i] * row.z[i]) / length;
@@ -82,7 +82,7 @@ class DepthFrame {
       bool returns = row.solid[i] >= 0 && scene_.solids[static_cast<std::size_t>(row.solid[i])].surface.returns_depth;
       BodyHit hit;
       const double x = rays_.x[first + i], y = rays_.y[first + i];
-      if (body && camera_body_.intersect(x, y, depth, hit)) {
+      if (body.intersect(x, y, depth, hit)) {
         depth = static_cast<float>(hit.depth_m);
         cosine = static_cast<float>(-hit.normal.dot(Eigen::Vector3d(x, y, 1))) / length;
         returns = true;
@@ -112,14 +112,14 @@ class DepthFrame {
       row.x[i] = d.x(), row.y[i] = d.y(), row.z[i] = d.z();
     }
     tracer_.find_blocked(projector_in_base_, row, row.size(), shaded);
-    const bool body = projector_body_.in_row(rays_.y[first]);
+    const BodyImage body = projector_body_.band(rays_.y[first], rays_.y[first]);
     for (std::size_t i = 0; i < row.size(); ++i) {
       float& strength = strength_[first + i];
       if (strength <= 0) continue;
       const double z = depth_[first + i];
       BodyHit hit;
-      if (shaded[i] != 0 || (body && projector_body_.intersect(rays_.x[first + i] - sensor_.baseline_m / z,
-                                                               rays_.y[first + i], z - 0.01, hit))) {
+      if (shaded[i] != 0 ||
+          body.intersect(rays_.x[first + i] - sensor_.baseline_m / z, rays_.y[first + i], z - 0.01, hit)) {
         strength = 0;
       }
     }
@@ -167,16 +167,19 @@ class DepthFrame {
   [[nodiscard]] double with_noise(double z, double normal) const {
     if (sensor_.disparity_step_px > 0) {
       const double disparity = disparity_focal_ / z + disparity_sigma_ * normal;
-      const double steps = std::round(disparity / sensor_.disparity_step_px);
+      const double steps = rounded(disparity / sensor_.disparity_step_px);
       if (steps < 1) return 0;
       return disparity_focal_ / (steps * sensor_.disparity_step_px);
     }
     return z + std::hypot(sensor_.sigma_floor_m, sensor_.sigma_at_1m_m * z * z) * normal;
   }
 
+  /// Of what is not negative; the library's functions cost a call for each pixel.
+  static double rounded(double value) { return static_cast<double>(static_cast<std::int64_t>(value + 0.5)); }
+
   [[nodiscard]] std::uint16_t quantised_mm(double measured_m) const {
     if (measured_m < sensor_.range_min_m || measured_m > sensor_.range_max_m) return 0;
-    return static_cast<std::uint16_t>(std::lround(measured_m * 1000));
+    return static_cast<std::uint16_t>(rounded(measured_m * 1000));
   }
 
   const Scene& scene_;
