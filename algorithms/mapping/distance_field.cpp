@@ -159,6 +159,10 @@ double DistanceField::distance_m(const Eigen::Vector3d& point_m) const {
     f[i] = p - whole;
     spread += f[i] * (1 - f[i]);
   }
+  const bool inside = v[0] >= 0 && v[1] >= 0 && v[2] >= 0 && v[0] + 1 < geometry_.size.x() &&
+                      v[1] + 1 < geometry_.size.y() && v[2] + 1 < geometry_.size.z();
+  const std::size_t first = inside ? geometry_.index({v[0], v[1], v[2]}) : 0;
+  const std::size_t row = to_size(geometry_.size.x()), layer = row * to_size(geometry_.size.y());
   double squared = 0;
   for (int dz = 0; dz < 2; ++dz) {
     const double wz = dz != 0 ? f[2] : 1 - f[2];
@@ -166,8 +170,10 @@ double DistanceField::distance_m(const Eigen::Vector3d& point_m) const {
       const double wy = wz * (dy != 0 ? f[1] : 1 - f[1]);
       for (int dx = 0; dx < 2; ++dx) {
         const int x = v[0] + dx, y = v[1] + dy, z = v[2] + dz;
-        if (!geometry_.contains({x, y, z})) continue;  // outside the grid nothing is free
-        const auto d = static_cast<double>(values_[geometry_.index({x, y, z})]);
+        if (!inside && !geometry_.contains({x, y, z})) continue;  // outside the grid nothing is free
+        const std::size_t at =
+            inside ? first + to_size(dz) * layer + to_size(dy) * row + to_size(dx) : geometry_.index({x, y, z});
+        const auto d = static_cast<double>(values_[at]);
         squared += wy * (dx != 0 ? f[0] : 1 - f[0]) * d * d;
       }
     }

@@ -330,9 +330,8 @@ void Workbench::revoke_zone() {
   const GridGeometry& g = map_.geometry();
   const double half_diagonal = 0.5 * std::sqrt(3.0) * g.resolution_m;
   for (std::size_t i = 0; i < free_mask_.size(); ++i) {
-    const bool in_reach_of_zone = zone_cylinder_.depth_m(g.center_m(g.voxel_at(i))) > -half_diagonal;
-    const bool taken = in_reach_of_zone && !map_.is_fixed_body(i) &&
-                       (map_.zone_revoked(i) || map_.voxel_class(i) == VoxelClass::kOccupied);
+    const bool taken = (map_.zone_revoked(i) || map_.voxel_class(i) == VoxelClass::kOccupied) &&
+                       !map_.is_fixed_body(i) && zone_cylinder_.depth_m(g.center_m(g.voxel_at(i))) > -half_diagonal;
     free_mask_[i] = taken ? 0 : 1;
     any_revoked_ = any_revoked_ || taken;
   }

@@ -5,10 +5,10 @@
 #include <numbers>
 #include <utility>
 
-#include "algorithms/kinematics/self_collision.hpp"
 #include "algorithms/mapping/distance_field.hpp"
 #include "algorithms/mapping/reach_zone.hpp"
 #include "algorithms/motion/certificate.hpp"
+#include "hal/sim/body_image.hpp"
 #include "hal/sim/random_streams.hpp"
 #include "hal/sim/ray_geometry.hpp"
 #include "platform/core/ensure.hpp"
@@ -31,21 +31,20 @@ struct Node {
   int reached_in_pass = -1;
 };
 
-/// Directions of an ideal sensor's rays in its own frame, scaled to unit depth along the optical axis.
-std::vector<Eigen::Vector3d> sensor_rays(const CameraIntrinsics& sensor, double range_m, double voxel_m) {
+/// Normalised image points through which an ideal sensor's rays go.
+struct RayGrid {
+  std::vector<double> x, y;  ///< of the columns, of the rows
+};
+
+RayGrid sensor_rays(const CameraIntrinsics& sensor, double range_m, double voxel_m) {
   const double step_m = kRaySpacing_voxels * voxel_m / range_m;  // at unit depth
   const double left = (-0.5 - sensor.cx) / sensor.fx, right = (sensor.width - 0.5 - sensor.cx) / sensor.fx;
   const double top = (-0.5 - sensor.cy) / sensor.fy, bottom = (sensor.height - 0.5 - sensor.cy) / sensor.fy;
   const int columns = std::min(sensor.width, static_cast<int>(std::ceil((right - left) / step_m)));
   const int rows = std::min(sensor.height, static_cast<int>(std::ceil((bottom - top) / step_m)));
-  std::vector<Eigen::Vector3d> rays;
-  rays.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      rays.emplace_back(left + (right - left) * (column + 0.5) / columns, top + (bottom - top) * (row + 0.5) / rows,
-                        1.0);
-    }
-  }
+  RayGrid rays;
+  for (int column = 0; column < columns; ++column) rays.x.push_back(left + (right - left) * (column + 0.5) / columns);
+  for (int row = 0; row < rows; ++row) rays.y.push_back(top + (bottom - top) * (row + 0.5) / rows);
   return rays;
 }
 
@@ -228,33 +227,27 @@ class Fixpoint {
     const LinkFrames frames = forward(*problem_.arm, q_rad);
     const Pose base_T_depth = (frames.flange() * problem_.flange_T_depth).pose();
     const Eigen::Vector3d eye = base_T_depth.translation();
-    const Capsules own = hiding_capsules(place(problem_.true_capsules, frames), base_T_depth);
-    for (const Eigen::Vector3d& ray : rays_) {
-      const double length_per_depth = ray.norm();
-      const Eigen::Vector3d direction = base_T_depth.linear() * (ray / length_per_depth);
-      const double hit_m = problem_.world->ray_m(eye, direction);
-      if (!(hit_m <= o.sensor_range_max_m) || hit_m / length_per_depth < o.sensor_range_min_m) continue;
-      if (hides(own, eye, direction, hit_m)) continue;
-      const bool marks = hit_m <= o.sensor_range_trusted_m;
-      walk_ray(problem_.geometry, eye, direction, marks ? hit_m + 1e-6 : o.sensor_range_trusted_m,
-               [&](std::size_t voxel) { seen[voxel] = 1; });
+    const BodyImage own(place(problem_.true_capsules, frames), base_T_depth, eye);
+    RayRow row(rays_.x.size());
+    for (const double y : rays_.y) {
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        const Eigen::Vector3f d = (base_T_depth.linear() * Eigen::Vector3d(rays_.x[i], y, 1)).cast<float>();
+        row.x[i] = d.x(), row.y[i] = d.y(), row.z[i] = d.z();
+      }
+      problem_.world->trace(eye, row);
+      const BodyImage hiding = own.band(y, y);
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        const double depth_m = row.t[i];
+        const Eigen::Vector3d ray(row.x[i], row.y[i], row.z[i]);
+        const double length_per_depth = ray.norm(), hit_m = depth_m * length_per_depth;
+        if (!(hit_m <= o.sensor_range_max_m) || depth_m < o.sensor_range_min_m) continue;
+        BodyHit body;
+        if (hiding.intersect(rays_.x[i], y, depth_m, body)) continue;
+        const bool marks = hit_m <= o.sensor_range_trusted_m;
+        walk_ray(problem_.geometry, eye, ray / length_per_depth, marks ? hit_m + 1e-6 : o.sensor_range_trusted_m,
+                 [&](std::size_t voxel) { seen[voxel] = 1; });
+      }
     }
-  }
-
-  /// Own capsules, but for those that hold the sensor itself.
-  static Capsules hiding_capsules(const Capsules& placed, const Pose& base_T_depth) {
-    Capsules own;
-    const Eigen::Vector3d eye = base_T_depth.translation();
-    for (const Capsule& capsule : placed) {
-      if (segment_distance_m(capsule.a, capsule.b, eye, eye) > capsule.radius_m) own.push_back(capsule);
-    }
-    return own;
-  }
-
-  static bool hides(const Capsules& own, const Eigen::Vector3d& eye, const Eigen::Vector3d& direction,
-                    double before_m) {
-    return std::ranges::any_of(
-        own, [&](const Capsule& capsule) { return ray_to_capsule_m(eye, direction, capsule) < before_m; });
   }
 
   void finish(ObservableSet& result) const {
@@ -275,7 +268,7 @@ class Fixpoint {
   Random random_;
   DistanceField field_;
   FreeSpace space_;
-  std::vector<Eigen::Vector3d> rays_;
+  RayGrid rays_;
   std::vector<std::uint8_t> seen_, free_, matter_;
   std::vector<std::vector<std::uint8_t>> seen_by_;  ///< one for each worker, joined after each round
   std::vector<Node> nodes_;

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "algorithms/kinematics/arm_model.hpp"
-#include "algorithms/kinematics/self_collision.hpp"
 #include "algorithms/mapping/grid_geometry.hpp"
 
 namespace firstlook::sim {
@@ -38,10 +37,6 @@ void walk_ray(const GridGeometry& geometry, const Eigen::Vector3d& origin_m, con
   }
 }
 
-/// Distance along a unit direction to the capsule's surface from outside; infinity when it is missed.
-[[nodiscard]] double ray_to_capsule_m(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
-                                      const Capsule& capsule);
-
 /// Distance between a segment and an axis-aligned box; 0 when they meet.
 [[nodiscard]] double segment_to_box_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& low,
                                       const Eigen::Vector3d& high);
@@ -55,13 +50,16 @@ void walk_capsule(const GridGeometry& geometry, const Capsule& capsule, double t
   const Eigen::Vector3i first = geometry.voxel(capsule.a.cwiseMin(capsule.b).array() - reach_m);
   const Eigen::Vector3i last = geometry.voxel(capsule.a.cwiseMax(capsule.b).array() + reach_m);
   const double half_m = 0.5 * geometry.resolution_m;
+  const Eigen::Vector3d axis = capsule.b - capsule.a;
+  const double length2 = axis.squaredNorm();
   Eigen::Vector3i v;
   for (v.z() = first.z(); v.z() <= last.z(); ++v.z()) {
     for (v.y() = first.y(); v.y() <= last.y(); ++v.y()) {
       for (v.x() = first.x(); v.x() <= last.x(); ++v.x()) {
         const Eigen::Vector3d center = geometry.center_m(v);
         const Eigen::Vector3d half = Eigen::Vector3d::Constant(half_m);
-        const double to_center_m = segment_distance_m(capsule.a, capsule.b, center, center);
+        const double along = length2 > 0 ? std::clamp(axis.dot(center - capsule.a) / length2, 0.0, 1.0) : 0.0;
+        const double to_center_m = (center - capsule.a - along * axis).norm();
         if (to_center_m >= reach_m + half.norm()) continue;  // beyond its corners
         if (to_center_m < reach_m + half_m ||                // within its inscribed ball
             segment_to_box_m(capsule.a, capsule.b, center - half, center + half) < reach_m) {

@@ -91,6 +91,8 @@ double Renderer::ray_m(const Vector3d& origin_m, const Vector3d& direction) cons
   return state_->tracer.distance_m(origin_m, direction);
 }
 
+void Renderer::trace(const Vector3d& origin_m, RayRow& row) const { state_->tracer.trace(origin_m, row, row.size()); }
+
 bool Renderer::sees(const Vector3d& from_m, const Vector3d& to_m) const {
   const double length_m = (to_m - from_m).norm();
   if (length_m <= kEndSlack_m) return true;

@@ -9,6 +9,7 @@
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/mapping/sensor_presets.hpp"
 #include "hal/api/cameras.hpp"
+#include "hal/sim/ray_tracer.hpp"
 #include "hal/sim/scene.hpp"
 #include "platform/core/image_view.hpp"
 #include "platform/loop/worker_pool.hpp"
@@ -81,6 +82,8 @@ class Renderer {
 
   /// Distance to the first surface along a unit direction, the arm left out; infinity when there is none. To 1e-5 m.
   [[nodiscard]] double ray_m(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction) const;
+  /// The first surface along each ray of a row, the arm left out.
+  void trace(const Eigen::Vector3d& origin_m, RayRow& row) const;
   /// Nothing solid between two points (the last 1 mm before `to` left out); the arm is not looked at.
   [[nodiscard]] bool sees(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) const;
 

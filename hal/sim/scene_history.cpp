@@ -70,6 +70,8 @@ double SceneWorld::ray_m(const Eigen::Vector3d& origin_m, const Eigen::Vector3d&
   return renderer_.ray_m(origin_m, direction);
 }
 
+void SceneWorld::trace(const Eigen::Vector3d& origin_m, RayRow& row) const { renderer_.trace(origin_m, row); }
+
 bool SceneWorld::touches(const Capsule& capsule) const {
   const Eigen::AlignedBox3d box = around(capsule);
   for (std::size_t i = 0; i < bounds_.size(); ++i) {

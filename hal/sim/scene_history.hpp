@@ -19,6 +19,7 @@ class SceneWorld final : public TrueWorld {
   explicit SceneWorld(const Renderer& renderer);
 
   [[nodiscard]] double ray_m(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction) const override;
+  void trace(const Eigen::Vector3d& origin_m, RayRow& row) const override;
   [[nodiscard]] bool touches(const Capsule& capsule) const override;
   [[nodiscard]] bool inside(const Eigen::Vector3d& point_m) const override;
   void matter(const GridGeometry& geometry, std::vector<std::uint8_t>& out) const override;

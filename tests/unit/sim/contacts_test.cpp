@@ -183,29 +183,6 @@ TEST_CASE("distance between segment and box against dense sampling", "[sim][cont
   }
 }
 
-TEST_CASE("distance along a ray to a capsule against marching", "[sim][contacts]") {
-  Random random(12);
-  int hits = 0;
-  for (int i = 0; i < 400; ++i) {
-    const Capsule capsule{random.normal3() * 0.3, random.normal3() * 0.3, 0.2, 1};
-    const Eigen::Vector3d origin = 2 * random.direction();
-    const Eigen::Vector3d direction = (random.normal3() * 0.3 - origin).normalized();
-    double marched = 0;  // sphere tracing
-    for (int k = 0; k < 400 && marched < 6; ++k) {
-      const Eigen::Vector3d p = origin + marched * direction;
-      marched += segment_distance_m(capsule.a, capsule.b, p, p) - capsule.radius_m;
-    }
-    const double exact = ray_to_capsule_m(origin, direction, capsule);
-    if (std::isfinite(exact)) {
-      ++hits;
-      CHECK(marched == Approx(exact).margin(1e-4));
-    } else {
-      CHECK(marched >= 6);
-    }
-  }
-  CHECK(hits > 50);
-}
-
 TEST_CASE("the camera's housing lies inside what the program takes for it", "[sim][contacts]") {
   const Capsule housing = true_housing(kArm.joints, kMount.pose());
   const Body program = body_with_camera(kArm, kMount);
