@@ -99,6 +99,16 @@ void add_part_pictures(const sim::RegionFigure& region, double known_after_sweep
   }
 }
 
+/// What mapping had taken until a moment of the job; empty: that moment never came.
+std::optional<TruthRecord::Way> way_to(const std::optional<double>& time_s, const RunRecord& record) {
+  const auto sweep = std::ranges::find(record.phases, "Sweep", &PhaseRecord::name);
+  if (!time_s || !record.mapping || sweep == record.phases.end()) return std::nullopt;
+  const auto views = std::ranges::count_if(record.mapping->views, [&](const MappingViewRecord& view) {
+    return view.phase != "end" && view.time_s <= *time_s;
+  });
+  return TruthRecord::Way{*time_s - sweep->start_s, static_cast<int>(views)};
+}
+
 /// Grades the finished job against the truth of the simulated cell.
 void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecord& record) {
   const Workbench& bench = cart.bench();
@@ -133,8 +143,8 @@ void grade(sim::Grader& grader, const Cart& cart, const Config& config, RunRecor
   truth.contacts = figures.contacts;
   truth.unknown_entries = figures.unknown_entries;
   truth.coverage_of_observable = figures.coverage_of_observable;
-  truth.known_95_s = figures.known_95_s;
-  truth.known_99_s = figures.known_99_s;
+  truth.to_95 = way_to(figures.known_95_s, record);
+  truth.to_99 = way_to(figures.known_99_s, record);
   truth.false_free_voxels = figures.false_free_voxels;
   truth.false_occupied_fraction = figures.false_occupied_fraction;
   if (claims.map == nullptr) return;

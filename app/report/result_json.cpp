@@ -90,6 +90,11 @@ Json wall_json(const WallRecord& wall) {
           {"workers", wall.workers}};
 }
 
+Json way_json(const std::optional<TruthRecord::Way>& way) {
+  if (!way) return nullptr;
+  return {{"time_s", way->time_s}, {"views", way->views}};
+}
+
 Json truth_json(const TruthRecord& truth) {
   Json regions = Json::array();
   for (const TruthRecord::Region& region : truth.regions) {
@@ -108,8 +113,8 @@ Json truth_json(const TruthRecord& truth) {
           {"contacts", truth.contacts},
           {"unknown_entries", truth.unknown_entries},
           {"coverage_of_observable", or_null(truth.coverage_of_observable)},
-          {"known_95_s", or_null(truth.known_95_s)},
-          {"known_99_s", or_null(truth.known_99_s)},
+          {"to_95", way_json(truth.to_95)},
+          {"to_99", way_json(truth.to_99)},
           {"false_free_voxels", or_null(truth.false_free_voxels)},
           {"false_occupied_fraction", or_null(truth.false_occupied_fraction)},
           {"regions", regions}};

@@ -229,8 +229,12 @@ struct TruthRecord {
   std::optional<double> depth_stamps_error_s;
   std::uint64_t contacts = 0;
   std::uint64_t unknown_entries = 0;
-  std::optional<double> coverage_of_observable;    ///< 0..1
-  std::optional<double> known_95_s, known_99_s;    ///< when so many hundredths of the observable were known
+  std::optional<double> coverage_of_observable;  ///< 0..1
+  struct Way {
+    double time_s = 0;  ///< since mapping began
+    int views = 0;      ///< stops
+  };
+  std::optional<Way> to_95, to_99;                 ///< until so many hundredths of the observable were known
   std::optional<std::uint64_t> false_free_voxels;  ///< known free for motion, their middle in matter
   std::optional<double> false_occupied_fraction;   ///< 0..1, of the reach zone; no matter within a voxel
   /// A part of the cell that is named in its description, e.g. behind the screens: share of its observable voxels

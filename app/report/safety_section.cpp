@@ -94,8 +94,13 @@ std::string truth_section(const RunRecord& record) {
   table.row({"contacts of the true body with the scene", grouped(t.contacts)});
   table.row({"entries of the true body into space not known free", grouped(t.unknown_entries)});
   row("seen of what could be observed", t.coverage_of_observable, " %", 100);
-  row("95 % of it were known after", t.known_95_s, " s");
-  row("99 % of it were known after", t.known_99_s, " s");
+  const auto way = [](const std::optional<TruthRecord::Way>& w) {
+    return w ? fmt::format("{:.0f} s of mapping, {} views", w->time_s, w->views) : "not reached";
+  };
+  if (t.coverage_of_observable) {
+    table.row({"95 % of it were known after", way(t.to_95)});
+    table.row({"99 % of it were known after", way(t.to_99)});
+  }
   table.row({"voxels called free that hold something",
              t.false_free_voxels ? grouped(*t.false_free_voxels) : "not determined"});
   row("of the space in reach called occupied with nothing within a voxel", t.false_occupied_fraction, " %", 100);

@@ -94,8 +94,9 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(keys_of(json["truth"]) == Keys{"hand_eye_error_mm", "hand_eye_error_mrad", "hand_eye_mahalanobis2",
                                        "depth_camera_error_mm", "depth_camera_error_mrad", "color_stamps_error_s",
                                        "depth_stamps_error_s", "contacts", "unknown_entries", "coverage_of_observable",
-                                       "known_95_s", "known_99_s", "false_free_voxels", "false_occupied_fraction",
-                                       "regions"});
+                                       "to_95", "to_99", "false_free_voxels", "false_occupied_fraction", "regions"});
+  CHECK(json["truth"]["to_95"] == ordered_json{{"time_s", 61.5}, {"views", 12}});
+  CHECK(json["truth"]["to_99"].is_null());
 }
 
 TEST_CASE("what was found of depth camera and stamps is told, and what was not", "[report]") {

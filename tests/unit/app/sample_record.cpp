@@ -223,8 +223,21 @@ RunRecord make_record() {
   r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
             "runs/20260131-7",      2};
   r.alignment = alignment();
-  r.truth =
-      TruthRecord{0.21, 0.34, 4.7, 0.3, 0.4, 1e-5, -3e-4, 0, 0, 0.972, 41, 0.003, {{"behind_box", 500, 0.12, 0.93}}};
+  r.truth = TruthRecord{0.21,
+                        0.34,
+                        4.7,
+                        0.3,
+                        0.4,
+                        1e-5,
+                        -3e-4,
+                        0,
+                        0,
+                        0.972,
+                        TruthRecord::Way{61.5, 12},
+                        std::nullopt,
+                        41,
+                        0.003,
+                        {{"behind_box", 500, 0.12, 0.93}}};
   return r;
 }
 
