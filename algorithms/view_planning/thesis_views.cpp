@@ -79,7 +79,7 @@ ThesisScore score_as_thesis(const ViewContext& context, const Transform<Base, Fl
 
 Result<ViewChoice> choose_as_thesis(const ViewContext& context, const JointVector& current, Planner& planner,
                                     const ThesisOptions& options) {
-  ENSURE(4541, has_closed_form_inverse(context.arm));
+  ENSURE(4551, has_closed_form_inverse(context.arm));
   PlannerOptions planning;
   planning.seed = options.seed + options.step;
   planning.iterations_max = options.plan_iterations_max;
