@@ -129,8 +129,26 @@ TEST_CASE("the scopes on the command line", "[scenario]") {
   CHECK_THAT(refused({"--calibration", "hand_eye.yaml"}), Contains("--only map and --only verify"));
   CHECK_THAT(refused({"--only", "calibrate", "--calibration", "x"}), Contains("--only map and --only verify"));
   CHECK_THAT(refused({"--only", "dance"}), Contains("verify"));
-  CHECK_THAT(refused({"--views", "thesis2014"}), Contains("thesis2014") && Contains("firstlook"));
+  CHECK_THAT(refused({"--views", "greedy"}), Contains("greedy") && Contains("thesis2014") && Contains("firstlook"));
   CHECK(folder.run_job("views", {"--views", "firstlook", "--faults", "operator.stop_at=3"}).exit_code == 6);
+}
+
+TEST_CASE("views as the thesis chose them: slower to the same, and as safe", "[scenario]") {
+  const JobFolder folder;
+  for (const std::string views : {"firstlook", "thesis2014"}) {
+    INFO(views);
+    REQUIRE(folder.run_job(views, {"--views", views}).exit_code == 0);
+    const Json truth = folder.read_json(views + "/result.json")["truth"];
+    CHECK(truth["contacts"] == 0);
+    CHECK(truth["unknown_entries"] == 0);
+    CHECK(truth["coverage_of_observable"] > 0.9);
+    CHECK(folder.run({"replay", views + "/journal.flj"}).exit_code == 0);
+  }
+  const auto time_to_95_s = [&](const std::string& views) {
+    const Json truth = folder.read_json(views + "/result.json")["truth"];
+    return truth["to_95"].is_null() ? 1e9 : truth["to_95"]["time_s"].get<double>();
+  };
+  CHECK(time_to_95_s("firstlook") < 0.9 * time_to_95_s("thesis2014"));
 }
 
 }  // namespace firstlook
