@@ -3,9 +3,9 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sched.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -66,6 +66,9 @@ ChildEnd end_of(int status, const rusage& usage) {
   return end;
 }
 
+/// glibc 2.36 declares pidfd_open for C alone.
+int open_descriptor(pid_t pid) { return static_cast<int>(syscall(SYS_pidfd_open, pid, 0)); }
+
 }  // namespace
 
 Result<ChildProcess> ChildProcess::start(const ChildCommand& command) {
@@ -100,7 +103,7 @@ Result<ChildProcess> ChildProcess::start(const ChildCommand& command) {
   return child;
 }
 
-ChildProcess::ChildProcess(pid_t pid) : pid_(pid), descriptor_(pidfd_open(pid, 0)) {}
+ChildProcess::ChildProcess(pid_t pid) : pid_(pid), descriptor_(open_descriptor(pid)) {}
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : pid_(std::exchange(other.pid_, -1)), descriptor_(std::exchange(other.descriptor_, -1)), end_(other.end_) {}
