@@ -30,6 +30,49 @@ std::optional<Distribution> distribution(std::vector<double> values) {
                       .mean = sum / static_cast<double>(values.size())};
 }
 
+std::optional<Distribution> distribution_of(const std::vector<CellRecord>& cells,
+                                            std::optional<double> CellFigures::* figure) {
+  std::vector<double> values;
+  for (const CellRecord& cell : cells) {
+    if (cell.figures.*figure) values.push_back(*(cell.figures.*figure));
+  }
+  return distribution(std::move(values));
+}
+
+std::optional<Distribution> distribution_of(const std::vector<CellRecord>& cells, double CellWall::* figure) {
+  std::vector<double> values;
+  for (const CellRecord& cell : cells) values.push_back(cell.wall.*figure);
+  return distribution(std::move(values));
+}
+
+std::uint64_t total(const std::vector<CellRecord>& cells, std::optional<double> CellFigures::* count) {
+  double sum = 0;
+  for (const CellRecord& cell : cells) sum += (cell.figures.*count).value_or(0);
+  return static_cast<std::uint64_t>(sum);
+}
+
+std::size_t count_of(const std::vector<CellRecord>& cells, CellOutcome outcome) {
+  return static_cast<std::size_t>(std::ranges::count(cells, outcome, &CellRecord::outcome));
+}
+
+std::size_t count_with_coverage(const std::vector<CellRecord>& cells, double coverage) {
+  return static_cast<std::size_t>(std::ranges::count_if(cells, [coverage](const CellRecord& cell) {
+    return cell.figures.coverage_of_observable && *cell.figures.coverage_of_observable >= coverage;
+  }));
+}
+
+CellRates rates_per_minute(const std::vector<CellRecord>& cells) {
+  double total_s = 0, processor_s = 0;
+  for (const CellRecord& cell : cells) {
+    total_s += cell.wall.total_s;
+    processor_s += cell.wall.processor_s;
+  }
+  const auto rate = [&](double s) {
+    return s > 0 ? std::optional(60 * static_cast<double>(cells.size()) / s) : std::nullopt;
+  };
+  return {rate(total_s), rate(processor_s)};
+}
+
 int CampaignCells::broken() const {
   return static_cast<int>(std::ranges::count_if(finished, [](const CellRecord& cell) {
     return cell.touched() || !ended_safely(cell.outcome) || cell.reason.empty();

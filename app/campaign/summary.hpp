@@ -18,6 +18,22 @@ struct Distribution {
 };
 /// Empty without values. Order of the values does not matter.
 [[nodiscard]] std::optional<Distribution> distribution(std::vector<double> values);
+[[nodiscard]] std::optional<Distribution> distribution_of(const std::vector<CellRecord>& cells,
+                                                          std::optional<double> CellFigures::* figure);
+[[nodiscard]] std::optional<Distribution> distribution_of(const std::vector<CellRecord>& cells,
+                                                          double CellWall::* figure);
+
+/// Sum of what is to be counted, over the cells that have it.
+[[nodiscard]] std::uint64_t total(const std::vector<CellRecord>& cells, std::optional<double> CellFigures::* count);
+[[nodiscard]] std::size_t count_of(const std::vector<CellRecord>& cells, CellOutcome outcome);
+/// Cells that know at least this share of the observable; one without a map does not.
+[[nodiscard]] std::size_t count_with_coverage(const std::vector<CellRecord>& cells, double coverage);
+
+/// Cells a minute for one core: by the clock, and by the processor's time that they used. Empty without cells.
+struct CellRates {
+  std::optional<double> by_clock, by_processor_time;
+};
+[[nodiscard]] CellRates rates_per_minute(const std::vector<CellRecord>& cells);
 
 /// Cells of a campaign, or of a shard of it.
 struct CampaignCells {

@@ -21,15 +21,6 @@ Json distribution_json(const std::optional<Distribution>& d) {
           {"p95", d->p95},     {"max", d->max}, {"mean", d->mean}};
 }
 
-template <typename Value>
-Json distribution_of(const std::vector<CellRecord>& cells, Value value) {
-  std::vector<double> values;
-  for (const CellRecord& cell : cells) {
-    if (const std::optional<double> v = value(cell)) values.push_back(*v);
-  }
-  return distribution_json(distribution(std::move(values)));
-}
-
 Json campaign_json(const CampaignCells& cells) {
   return {{"first_seed", cells.list.first_seed},
           {"cells", cells.list.cells},
@@ -43,8 +34,7 @@ Json campaign_json(const CampaignCells& cells) {
 Json outcomes_json(const CampaignCells& cells) {
   Json json = Json::object();
   for (std::size_t i = 0; i < kCellOutcomeNames.size(); ++i) {
-    json[std::string(kCellOutcomeNames[i])] = std::ranges::count_if(
-        cells.finished, [i](const CellRecord& cell) { return cell.outcome == static_cast<CellOutcome>(i); });
+    json[std::string(kCellOutcomeNames[i])] = count_of(cells.finished, static_cast<CellOutcome>(i));
   }
   return json;
 }
@@ -75,16 +65,7 @@ Json reasons_json(const CampaignCells& cells) {
   return json;
 }
 
-double total(const CampaignCells& cells, std::optional<double> CellFigures::* value) {
-  double sum = 0;
-  for (const CellRecord& cell : cells.finished) sum += (cell.figures.*value).value_or(0);
-  return sum;
-}
-
 Json safety_json(const CampaignCells& cells) {
-  const auto whole = [&](std::optional<double> CellFigures::* value) {
-    return static_cast<std::int64_t>(total(cells, value));
-  };
   Json graded =
       std::ranges::count_if(cells.finished, [](const CellRecord& c) { return c.figures.contacts.has_value(); });
   Json touched = Json::array();
@@ -96,17 +77,15 @@ Json safety_json(const CampaignCells& cells) {
                        {"command", run_command(cell.seed, cells.list.faults)}});
   }
   return {{"cells_graded", graded},
-          {"contacts", whole(&CellFigures::contacts)},
-          {"unknown_entries", whole(&CellFigures::unknown_entries)},
-          {"false_free_voxels", whole(&CellFigures::false_free_voxels)},
-          {"loop_allocations_after_seal", whole(&CellFigures::loop_allocations)},
+          {"contacts", total(cells.finished, &CellFigures::contacts)},
+          {"unknown_entries", total(cells.finished, &CellFigures::unknown_entries)},
+          {"false_free_voxels", total(cells.finished, &CellFigures::false_free_voxels)},
+          {"loop_allocations_after_seal", total(cells.finished, &CellFigures::loop_allocations)},
           {"cells_with_contacts_or_entries", touched}};
 }
 
 Json reached_json(const CampaignCells& cells, double coverage) {
-  const auto count = std::ranges::count_if(cells.finished, [coverage](const CellRecord& cell) {
-    return cell.figures.coverage_of_observable.value_or(-1) >= coverage;
-  });
+  const std::size_t count = count_with_coverage(cells.finished, coverage);
   const Json share = cells.finished.empty()
                          ? Json(nullptr)
                          : Json(static_cast<double>(count) / static_cast<double>(cells.finished.size()));
@@ -145,18 +124,9 @@ Json worst_json(const CampaignCells& cells) {
   return json;
 }
 
-/// Cells a minute if each took as long as they did on average: by the clock, and by the processor's time that they
-/// used.
 Json rate_json(const CampaignCells& cells) {
-  double total_s = 0, processor_s = 0;
-  for (const CellRecord& cell : cells.finished) {
-    total_s += cell.wall.total_s;
-    processor_s += cell.wall.processor_s;
-  }
-  const auto rate = [&](double s) {
-    return s > 0 ? Json(60 * static_cast<double>(cells.finished.size()) / s) : Json(nullptr);
-  };
-  return {{"by_clock", rate(total_s)}, {"by_processor_time", rate(processor_s)}};
+  const CellRates rates = rates_per_minute(cells.finished);
+  return {{"by_clock", or_null(rates.by_clock)}, {"by_processor_time", or_null(rates.by_processor_time)}};
 }
 
 Json wall_json(const CampaignCells& cells) {
@@ -164,9 +134,7 @@ Json wall_json(const CampaignCells& cells) {
   for (const CellRecord& cell : cells.finished) {
     if (cell.wall.kept) kept.push_back(cell.seed);
   }
-  const auto of = [&](double CellWall::* value) {
-    return distribution_of(cells.finished, [value](const CellRecord& c) { return std::optional(c.wall.*value); });
-  };
+  const auto of = [&](double CellWall::* value) { return distribution_json(distribution_of(cells.finished, value)); };
   return {{"cell_s", of(&CellWall::total_s)},
           {"cell_processor_s", of(&CellWall::processor_s)},
           {"peak_resident_bytes", of(&CellWall::peak_resident_bytes)},
@@ -191,8 +159,7 @@ std::string summary_json(const CampaignCells& cells) {
                       {"at_least_0_95", reached_json(cells, 0.95)},
                       {"below_0_99", below_json(cells, 0.99)}};
   for (const FigureColumn& column : kFigureColumns) {
-    json["figures"][std::string(column.name)] =
-        distribution_of(cells.finished, [&](const CellRecord& cell) { return cell.figures.*column.value; });
+    json["figures"][std::string(column.name)] = distribution_json(distribution_of(cells.finished, column.value));
   }
   json["worst"] = worst_json(cells);
   json["wall"] = wall_json(cells);

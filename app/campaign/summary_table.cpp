@@ -38,43 +38,26 @@ std::string row_text(std::string_view label, const std::optional<Distribution>& 
 std::string distributions_text(const CampaignCells& cells) {
   std::string text =
       fmt::format("{:22} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7}\n", "", "min", "5 %", "median", "95 %", "max", "cells");
-  const auto add = [&](std::string_view label, auto value, double factor, int digits) {
-    std::vector<double> values;
-    for (const CellRecord& cell : cells.finished) {
-      if (const std::optional<double> v = value(cell)) values.push_back(*v);
-    }
-    text += row_text(label, distribution(std::move(values)), factor, digits);
-  };
   for (const Row& row : kRows) {
-    add(row.label, [&](const CellRecord& cell) { return cell.figures.*row.value; }, row.factor, row.digits);
+    text += row_text(row.label, distribution_of(cells.finished, row.value), row.factor, row.digits);
   }
-  add("computer's time, s", [](const CellRecord& cell) { return std::optional(cell.wall.total_s); }, 1, 1);
+  text += row_text("computer's time, s", distribution_of(cells.finished, &CellWall::total_s), 1, 1);
   return text;
 }
 
 std::string outcomes_text(const CampaignCells& cells) {
   std::string text;
   for (std::size_t i = 0; i < kCellOutcomeNames.size(); ++i) {
-    const auto count = std::ranges::count_if(
-        cells.finished, [i](const CellRecord& cell) { return cell.outcome == static_cast<CellOutcome>(i); });
+    const std::size_t count = count_of(cells.finished, static_cast<CellOutcome>(i));
     if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, kCellOutcomeNames[i]);
   }
   std::ranges::replace(text, '_', ' ');
   return text.empty() ? "none finished" : text;
 }
 
-std::uint64_t total(const CampaignCells& cells, std::optional<double> CellFigures::* value) {
-  double sum = 0;
-  for (const CellRecord& cell : cells.finished) sum += (cell.figures.*value).value_or(0);
-  return static_cast<std::uint64_t>(sum);
-}
-
 std::string coverage_text(const CampaignCells& cells) {
   const auto share = [&](double coverage) {
-    const auto count = std::ranges::count_if(cells.finished, [coverage](const CellRecord& cell) {
-      return cell.figures.coverage_of_observable.value_or(-1) >= coverage;
-    });
-    return fmt::format("{} of {} cells", count, cells.finished.size());
+    return fmt::format("{} of {} cells", count_with_coverage(cells.finished, coverage), cells.finished.size());
   };
   return fmt::format("coverage  {} know 99 % of what can be observed, {} know 95 %\n", share(0.99), share(0.95));
 }
@@ -114,15 +97,10 @@ std::string not_done_text(const CampaignCells& cells) {
 }
 
 std::string rate_text(const CampaignCells& cells) {
-  double total_s = 0, processor_s = 0;
-  for (const CellRecord& cell : cells.finished) {
-    total_s += cell.wall.total_s;
-    processor_s += cell.wall.processor_s;
-  }
-  if (total_s <= 0 || processor_s <= 0) return {};
-  const double minutes = 60 * static_cast<double>(cells.finished.size());
+  const CellRates rates = rates_per_minute(cells.finished);
+  if (!rates.by_clock || !rates.by_processor_time) return {};
   return fmt::format("rate      {:.2f} cells a minute for each core by the clock, {:.2f} by processor time\n",
-                     minutes / total_s, minutes / processor_s);
+                     *rates.by_clock, *rates.by_processor_time);
 }
 
 }  // namespace
@@ -133,9 +111,10 @@ std::string summary_table(const CampaignCells& cells) {
                                  cells.shard.whole() ? "" : ", shard " + cells.shard.text(),
                                  cells.list.faults.empty() ? "" : ", faults " + cells.list.faults);
   text += fmt::format("outcome   {}\n", outcomes_text(cells));
-  text += fmt::format("safety    {} contacts, {} entries into unknown space, {} voxels free that hold matter\n",
-                      total(cells, &CellFigures::contacts), total(cells, &CellFigures::unknown_entries),
-                      total(cells, &CellFigures::false_free_voxels));
+  text +=
+      fmt::format("safety    {} contacts, {} entries into unknown space, {} voxels free that hold matter\n",
+                  total(cells.finished, &CellFigures::contacts), total(cells.finished, &CellFigures::unknown_entries),
+                  total(cells.finished, &CellFigures::false_free_voxels));
   text +=
       coverage_text(cells) + distributions_text(cells) + worst_text(cells) + not_done_text(cells) + rate_text(cells);
   return text;
