@@ -17,6 +17,7 @@
 #include "app/shell/cart.hpp"
 #include "app/shell/job_settings.hpp"
 #include "app/shell/replay.hpp"
+#include "hal/sim/faults.hpp"
 #include "hal/sim/simulated_cell.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/terminal.hpp"
@@ -304,6 +305,12 @@ int run_job(const RunCommand& command) {
   return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());
 }
 
+/// The faults are the simulated cell's: what it would refuse in every cell is refused once, before the first.
+int run_campaign_of(const CampaignCommandOptions& options) {
+  if (const auto faults = sim::parse_faults(options.faults); !faults) return fail(faults.error());
+  return run_campaign_command(options);
+}
+
 /// Data that nobody received must not look like success: a full disk shows itself only here.
 bool flush_stdout() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return true;
@@ -318,6 +325,7 @@ struct Dispatch {
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
   int operator()(const ExportCommandOptions& c) const { return run_export_command(c); }
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
+  int operator()(const CampaignCommandOptions& c) const { return run_campaign_of(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

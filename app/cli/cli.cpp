@@ -32,6 +32,35 @@ struct ConfigFlags {
   }
 };
 
+CLI::App* add_campaign(CLI::App& app, CampaignCommandOptions& campaign) {
+  CLI::App* added = app.add_subcommand("campaign", "the job in many random cells, each in a process of its own");
+  added->add_option("--cells", campaign.cells, "how many; cell i is random:(S+i) with seed S+i and the fast sensor")
+      ->required();
+  added->add_option("--seed", campaign.first_seed, "S, of the first cell")->capture_default_str();
+  added->add_option("--jobs", campaign.jobs, "processes at once (default: one for each processor)");
+  added->add_option("--shard", campaign.shard, "I/N: of the cells only those whose number i leaves I-1 divided by N");
+  added->add_option("--faults", campaign.faults, "what goes wrong in every cell, as in `run`");
+  added->add_option("--json", campaign.json,
+                    "file for the summary, or - for stdout (default summary.json in the folder)");
+  added->add_option("--out", campaign.out,
+                    "folder of the finished cells and of kept runs; the same command goes on with what is in it "
+                    "(default campaigns/seed-S, with the faults behind it)");
+  added->add_flag("--merge", campaign.merge, "run nothing: the summary of what all shards have finished");
+  added->add_option("--cell-limit", campaign.cell_limit_s, "seconds until a cell counts as hung and is ended")
+      ->capture_default_str();
+  added
+      ->add_option("--keep", campaign.kept_max,
+                   "run folders kept of cells that are not done, or touched or entered what they must not")
+      ->capture_default_str();
+  added->footer(
+      "Exit codes: 0 every cell ended done, rejected or safely stopped with a reason, without contact and without "
+      "entry "
+      "into unknown space; 2 usage, 3 data, a full disk, or cells missing with --merge; 6 stopped by a signal (the "
+      "same "
+      "command goes on); 70 a contact, an entry, or a cell that crashed, hung, faulted or failed.");
+  return added;
+}
+
 }  // namespace
 
 ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
@@ -155,6 +184,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                         "A4, A3, letter, or WIDTHxHEIGHT in mm (default: the smallest that fits)");
   board_app->add_option("-o,--out", board.out, "file to write")->capture_default_str();
 
+  CampaignCommandOptions campaign;
+  CLI::App* campaign_app = add_campaign(app, campaign);
+
   ReplayCommand replay;
   CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
   replay_app->add_option("journal", replay.journal, "journal.flj of a run")->required();
@@ -208,6 +240,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
     return {export_options, 0};
   }
   if (board_app->parsed()) return {board, 0};
+  if (campaign_app->parsed()) return {campaign, 0};
   if (replay_app->parsed()) return {replay, 0};
   if (states_app->parsed()) return {StatesCommand{}, 0};
   if (explain_app->parsed()) return {explain, 0};

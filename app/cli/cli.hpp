@@ -7,6 +7,7 @@
 
 #include "app/cli/board_command.hpp"
 #include "app/cli/calibrate_command.hpp"
+#include "app/cli/campaign_command.hpp"
 #include "app/cli/export_command.hpp"
 #include "app/cli/map_command.hpp"
 #include "app/cli/small_commands.hpp"
@@ -34,8 +35,9 @@ struct ExplainCommand {
   std::string code;
 };
 
-using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,
-                             BoardCommandOptions, ReplayCommand, StatesCommand, ExplainCommand, ConfigCommandOptions>;
+using Command =
+    std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions, BoardCommandOptions,
+                 CampaignCommandOptions, ReplayCommand, StatesCommand, ExplainCommand, ConfigCommandOptions>;
 
 /// Either a command, or the exit code after help, version or an error of usage were printed.
 struct ParsedCommandLine {
