@@ -47,17 +47,15 @@ UnknownCluster describe_cluster(const VoxelMap& map, const std::vector<std::uint
   return cluster;
 }
 
-}  // namespace
-
-std::vector<UnknownCluster> find_remaining(const VoxelMap& map, std::span<const std::uint8_t> zone,
-                                           std::size_t voxels_min) {
+// Calls visit(voxels) for each cluster, in the order of their first voxels; visit may change the vector.
+template <typename Visit>
+void for_each_cluster(const VoxelMap& map, std::span<const std::uint8_t> zone, Visit visit) {
   ENSURE(3061, zone.empty() || zone.size() == map.size());
   ENSURE(3062, map.size() <= std::numeric_limits<std::uint32_t>::max());
   std::vector<bool> open(map.size());
   for (std::size_t i = 0; i < open.size(); ++i)
     open[i] = map.voxel_class(i) == VoxelClass::kUnknown && (zone.empty() || zone[i] != 0);
 
-  std::vector<UnknownCluster> clusters;
   std::vector<std::uint32_t> voxels;
   for (std::size_t seed = 0; seed < open.size(); ++seed) {
     if (!open[seed]) continue;
@@ -70,15 +68,34 @@ std::vector<UnknownCluster> find_remaining(const VoxelMap& map, std::span<const 
         voxels.push_back(static_cast<std::uint32_t>(other));
       });
     }
-    if (voxels.size() < voxels_min) continue;
+    visit(voxels);
+  }
+}
+
+}  // namespace
+
+std::vector<UnknownCluster> find_remaining(const VoxelMap& map, std::span<const std::uint8_t> zone,
+                                           std::size_t voxels_min) {
+  std::vector<UnknownCluster> clusters;
+  for_each_cluster(map, zone, [&](std::vector<std::uint32_t>& voxels) {
+    if (voxels.size() < voxels_min) return;
     std::sort(voxels.begin(), voxels.end());
     UnknownCluster cluster = describe_cluster(map, voxels);
     if (!cluster.frontier.empty()) clusters.push_back(std::move(cluster));
-  }
+  });
   // Stable: equal sizes keep the order of their first voxels.
   std::stable_sort(clusters.begin(), clusters.end(),
                    [](const UnknownCluster& a, const UnknownCluster& b) { return a.voxels > b.voxels; });
   return clusters;
+}
+
+std::vector<std::uint32_t> find_specks(const VoxelMap& map, std::span<const std::uint8_t> zone,
+                                       std::size_t voxels_min) {
+  std::vector<std::uint32_t> specks;
+  for_each_cluster(map, zone, [&](const std::vector<std::uint32_t>& voxels) {
+    if (voxels.size() < voxels_min) specks.insert(specks.end(), voxels.begin(), voxels.end());
+  });
+  return specks;
 }
 
 }  // namespace firstlook

@@ -23,4 +23,8 @@ struct UnknownCluster {
 [[nodiscard]] std::vector<UnknownCluster> find_remaining(const VoxelMap& map, std::span<const std::uint8_t> zone,
                                                          std::size_t voxels_min);
 
+/// The voxels of all smaller clusters than those, whether they touch free space or not.
+[[nodiscard]] std::vector<std::uint32_t> find_specks(const VoxelMap& map, std::span<const std::uint8_t> zone,
+                                                     std::size_t voxels_min);
+
 }  // namespace firstlook

@@ -67,12 +67,12 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
   unreached_.reserve(room);
 }
 
-std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, int candidates_max, int workers_max,
-                                        int certificate_samples_max, const GainSampling& sampling) {
+std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, const DepthSensor& sensor, int candidates_max,
+                                        int workers_max, int certificate_samples_max, const GainSampling& sampling) {
   const auto rays = static_cast<std::size_t>(sampling.columns) * static_cast<std::size_t>(sampling.rows);
   const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
-  const std::size_t worker = geometry.count() + rays * sizeof(Eigen::Vector3d);
-  return GainModel::required_bytes(geometry, sampling) + static_cast<std::size_t>(workers_max) * worker +
+  const std::size_t worker = geometry.count() + 2 * rays * sizeof(Eigen::Vector3d);
+  return GainModel::required_bytes(geometry, sensor, sampling) + static_cast<std::size_t>(workers_max) * worker +
          room * (sizeof(Candidate) + 2 * sizeof(int));
 }
 
@@ -122,6 +122,7 @@ bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointV
   if (distance_m < near_m || distance_m > std::max(near_m, kStandOffMax_m)) return false;
   if (to_eye.dot(axis) < std::cos(kAimCone_rad) * distance_m) return false;
   if (c.space.margin_m(eye, c.clearance) < 0 || !is_seen_from(c.map, eye, voxel)) return false;
+  if (gain_.needs_backing(voxel) && !gain_.is_backed(c.map, eye, -to_eye / distance_m)) return false;
   const auto base_T_depth =
       look_at<Depth>(target, to_eye / distance_m, distance_m, random.uniform(0, 2 * std::numbers::pi));
   double nearest_rad = 1e9;

@@ -61,8 +61,9 @@ class ViewChooser {
   /// @param certificate_samples_max  upper limit of ExploreOptions::certificate_samples
   ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor, int candidates_max = 320, int workers_max = 2,
               int certificate_samples_max = 1000, const GainSampling& sampling = {});
-  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, int candidates_max = 320,
-                                                  int workers_max = 2, int certificate_samples_max = 1000,
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const DepthSensor& sensor,
+                                                  int candidates_max = 320, int workers_max = 2,
+                                                  int certificate_samples_max = 1000,
                                                   const GainSampling& sampling = {});
 
   /// The view with the highest gain for each second that a certified path leads to; the same arguments give the same

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "algorithms/kinematics/self_collision.hpp"
+#include "algorithms/mapping/remaining.hpp"
 #include "algorithms/view_planning/ray_walk.hpp"
 
 namespace firstlook {
@@ -40,6 +41,7 @@ bool may_block(const Capsule& capsule, const Eigen::Vector3d& eye, const Eigen::
 
 GainWorker::GainWorker(const GridGeometry& geometry, std::size_t rays_max) : scratch(geometry) {
   rays.ends_m.reserve(rays_max);
+  returning.ends_m.reserve(rays_max);
 }
 
 GainModel::GainModel(const GridGeometry& geometry, const DepthSensor& sensor, const GainSampling& sampling)
@@ -49,23 +51,26 @@ GainModel::GainModel(const GridGeometry& geometry, const DepthSensor& sensor, co
       rays_(GainRays::pinhole(sensor.intrinsics, sampling.columns, sampling.rows,
                               std::min(sensor.range_max_m, sensor.range_trusted_m))),
       plane_(geometry),
-      futile_(geometry) {
+      futile_(geometry),
+      far_(geometry, sensor.range_max_m) {
   frontier_.reserve(geometry.count());
   for (const Eigen::Vector3d& end : rays_.ends_m) {
     half_cone_rad_ = std::max(half_cone_rad_, std::acos(std::clamp(end.z() / end.norm(), -1.0, 1.0)));
   }
 }
 
-std::size_t GainModel::required_bytes(const GridGeometry& geometry, const GainSampling& sampling) {
+std::size_t GainModel::required_bytes(const GridGeometry& geometry, const DepthSensor& sensor,
+                                      const GainSampling& sampling) {
   const auto rays = static_cast<std::size_t>(sampling.columns) * static_cast<std::size_t>(sampling.rows);
   return GainPlane::required_bytes(geometry) + geometry.count() * (sizeof(std::uint8_t) + sizeof(std::uint32_t)) +
-         rays * sizeof(Eigen::Vector3d);
+         rays * sizeof(Eigen::Vector3d) + FarReturns::required_bytes(geometry, sensor.range_max_m);
 }
 
 void GainModel::prepare(const ViewContext& context) {
   ENSURE(4511, context.map.geometry() == geometry_);
   ENSURE(4512, context.zone.size() == geometry_.count());
   unknown_ = 0;
+  backed_only_m_.setEmpty();
   const std::span<std::uint8_t> plane = plane_.what();
   for (std::size_t i = 0; i < plane.size(); ++i) {
     const bool counts = context.zone[i] != 0;
@@ -77,12 +82,18 @@ void GainModel::prepare(const ViewContext& context) {
       case VoxelClass::kUnknown:
         plane[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight;
         unknown_ += counts ? 1 : 0;
+        if (counts && needs_backing(i)) backed_only_m_.extend(geometry_.center_m(geometry_.voxel_at(i)));
         break;
       case VoxelClass::kFree:
         plane[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass;
         break;
     }
   }
+  for (const std::uint32_t i :
+       find_specks(context.map, context.zone, static_cast<std::size_t>(sampling_.cluster_voxels_min))) {
+    if (plane[i] == kUnknownWeight) plane[i] = kUnknownNoWeight;
+  }
+  if (!far_.knows_returns()) backed_only_m_.setEmpty();
   plane_.prepare(UnknownReading::kSeeThrough);
   find_frontier(context);
   if (context.prior != nullptr) prepare_prior(context);
@@ -102,7 +113,9 @@ void GainModel::prepare_prior(const ViewContext& context) {
 void GainModel::find_frontier(const ViewContext& context) {
   frontier_.clear();
   for (std::size_t i = 0; i < geometry_.count(); ++i) {
-    if (plane_.what()[i] != kUnknownWeight) continue;
+    const bool backed_only = !backed_only_m_.isEmpty() && plane_.what()[i] == kOpaque && context.zone[i] != 0 &&
+                             context.map.voxel_class(i) == VoxelClass::kUnknown && needs_backing(i);
+    if (plane_.what()[i] != kUnknownWeight && !backed_only) continue;
     const Eigen::Vector3i v = geometry_.voxel_at(i);
     for (int side = 0; side < 6; ++side) {
       Eigen::Vector3i n = v;
@@ -139,14 +152,74 @@ ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, 
   const LinkFrames frames = forward(context.arm, q_rad);
   const Transform<Base, Depth> base_T_depth = frames.flange() * context.flange_T_depth;
   const GainRays& rays = free_rays(context, frames, base_T_depth, worker);
-  const GainCount counted = count_unknown(plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch);
-  const auto unknown = static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
-  ViewGain gain{.unknown = unknown, .again = counted.voxels - unknown};
+  const auto count_along = [&](const GainRays& along) {
+    const GainCount counted = count_unknown(plane_, along, base_T_depth, sensor_.range_min_m, worker.scratch);
+    const auto unknown =
+        static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
+    return ViewGain{.unknown = unknown, .again = counted.voxels - unknown};
+  };
+  ViewGain gain = count_along(rays);
+  if (far_.knows_openings() && gain.unknown + gain.again > 0) {
+    const ViewGain sure = count_along(returning_rays(base_T_depth, rays, worker));
+    gain.doubtful = gain.unknown - sure.unknown;
+    gain.doubtful_again = gain.again - sure.again;
+  }
+  gain.unknown += count_backed(context, base_T_depth, rays, worker.scratch);
   if (context.prior != nullptr) {
     gain.expected_surface =
         count_unknown(*prior_plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch).voxels;
   }
   return gain;
+}
+
+bool GainModel::is_backed(const VoxelMap& map, const Eigen::Vector3d& from_m, const Eigen::Vector3d& direction) const {
+  const Eigen::Vector3d to_m = from_m + sensor_.range_max_m * direction;
+  bool met = false;
+  walk_ray(geometry_, from_m, to_m, [&](std::size_t i, double) {
+    met = map.voxel_class(i) == VoxelClass::kOccupied;
+    return !met;
+  });
+  return met || far_.lies_between(from_m, to_m);
+}
+
+std::uint32_t GainModel::count_backed(const ViewContext& context, const Transform<Base, Depth>& base_T_depth,
+                                      const GainRays& rays, GainScratch& scratch) const {
+  if (backed_only_m_.isEmpty()) return 0;
+  constexpr std::size_t kStride = 4;  // of the rays, which stand in tiles: a quarter of them finds what is worth a look
+  const Eigen::Vector3d eye = base_T_depth.translation();
+  std::uint32_t counted = 0;
+  for (std::size_t r = 0; r < rays.ends_m.size(); r += kStride) {
+    for (const std::uint32_t i : pass_with_backing(context, eye, base_T_depth * rays.ends_m[r], rays.ends_m[r].z()))
+      counted += scratch.mark(i) ? 1U : 0U;
+  }
+  return counted;
+}
+
+GainModel::Passed GainModel::pass_with_backing(const ViewContext& context, const Eigen::Vector3d& eye,
+                                               const Eigen::Vector3d& end, double depth_m) const {
+  Passed passed;
+  if (!Eigen::AlignedBox3d(eye.cwiseMin(end), eye.cwiseMax(end)).intersects(backed_only_m_)) return passed;
+  walk_ray(geometry_, eye, end, [&](std::size_t i, double entry) {
+    const VoxelClass voxel = context.map.voxel_class(i);
+    if (voxel == VoxelClass::kOccupied) return false;
+    if (voxel == VoxelClass::kFree || entry * depth_m < sensor_.range_min_m) return true;
+    if (futile_.backed(i) >= sampling_.futile_max) return false;
+    if (context.zone[i] != 0 && needs_backing(i) && !passed.full()) passed.push_back(static_cast<std::uint32_t>(i));
+    return true;
+  });
+  if (!passed.empty() && !is_backed(context.map, eye, (end - eye).normalized())) passed.clear();
+  return passed;
+}
+
+const GainRays& GainModel::returning_rays(const Transform<Base, Depth>& base_T_depth, const GainRays& rays,
+                                          GainWorker& worker) const {
+  const Eigen::Vector3d eye = base_T_depth.translation();
+  worker.returning.ends_m.clear();
+  for (const Eigen::Vector3d& end : rays.ends_m) {
+    const Eigen::Vector3d far_end = base_T_depth * Eigen::Vector3d(end * (sensor_.range_max_m / end.norm()));
+    if (!far_.is_open(eye, far_end)) worker.returning.ends_m.push_back(end);
+  }
+  return worker.returning;
 }
 
 std::size_t GainModel::remember_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) {
@@ -161,11 +234,21 @@ std::size_t GainModel::remember_look(const ViewContext& context, const JointVect
       const bool in_range = entry * end.z() >= sensor_.range_min_m;
       const bool unknown = voxel == VoxelClass::kUnknown;
       if (in_range && context.zone[i] != 0 && (unknown || needs_again(context, i)) && worker.scratch.mark(i)) {
-        futile_.add(i);
+        futile_.add(i, unknown && is_backed(context.map, base_T_depth.translation(),
+                                            (base_T_depth * end - base_T_depth.translation()).normalized()));
         ++futile;
       }
-      return voxel == VoxelClass::kFree || (unknown && !in_range);
+      // What counts nothing hides nothing from the gain, either.
+      return voxel == VoxelClass::kFree || (unknown && (!in_range || plane_.what()[i] == kUnknownNoWeight));
     });
+  }
+  // What only rays with a surface behind still count, all along such a ray: it should have told of each.
+  worker.scratch.begin();
+  const Eigen::Vector3d eye = base_T_depth.translation();
+  for (const Eigen::Vector3d& end : rays.ends_m) {
+    for (const std::uint32_t i : pass_with_backing(context, eye, base_T_depth * end, end.z())) {
+      if (worker.scratch.mark(i)) futile_.add(i, true);
+    }
   }
   return futile;
 }

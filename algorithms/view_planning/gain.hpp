@@ -1,13 +1,16 @@
 /// The expected gain of a look: unknown voxels along the rays that the arm's own body leaves free.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "algorithms/view_planning/far_returns.hpp"
 #include "algorithms/view_planning/view_context.hpp"
+#include "platform/core/fixed_vector.hpp"
 
 namespace firstlook {
 
@@ -15,22 +18,27 @@ namespace firstlook {
 struct GainSampling {
   int columns = 44;  ///< 1.3 degrees for a Kinect: a 5 cm voxel is met out to 2.2 m, and the reach zone ends before
   int rows = 33;
-  int futile_max = 2;  ///< looks without result after which a voxel is taken to be solid or to give no return
+  int cluster_voxels_min =
+      8;               ///< unknown voxels in smaller clusters count nothing: rays see them everywhere along edges
+  int futile_max = 1;  ///< looks without result after which a voxel is taken to be solid or to give no return
 };
 
 /// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark
-/// surface). Without it a voxel that the sensor cannot resolve would attract the arm forever. Memory is taken at
-/// construction.
+/// surface), and of them those along rays with a surface behind. Without it a voxel that the sensor cannot resolve
+/// would attract the arm forever. Memory is taken at construction.
 class FutileLooks {
  public:
   explicit FutileLooks(const GridGeometry& geometry) : count_(geometry.count(), 0) {}
-  [[nodiscard]] int count(std::size_t index) const { return count_[index]; }
-  void add(std::size_t index) {
-    if (count_[index] < 255) ++count_[index];
+  [[nodiscard]] int count(std::size_t index) const { return count_[index] & kMax; }
+  [[nodiscard]] int backed(std::size_t index) const { return count_[index] >> kBits; }
+  void add(std::size_t index, bool backed) {
+    if (count(index) < kMax) ++count_[index];
+    if (backed && this->backed(index) < kMax) count_[index] = static_cast<std::uint8_t>(count_[index] + kMax + 1);
   }
   void clear() { std::fill(count_.begin(), count_.end(), std::uint8_t{0}); }
 
  private:
+  static constexpr int kBits = 4, kMax = (1 << kBits) - 1;
   std::vector<std::uint8_t> count_;
 };
 
@@ -39,14 +47,16 @@ class GainWorker {
  public:
   GainWorker(const GridGeometry& geometry, std::size_t rays_max);
   GainScratch scratch;
-  GainRays rays;  ///< those that the body leaves free
+  GainRays rays;       ///< those that the body leaves free
+  GainRays returning;  ///< and of these those that are not known to go where nothing returns
 };
 
 /// Counts gains on one map. The plane is built once for each choice, then any number of workers count on it.
 class GainModel {
  public:
   GainModel(const GridGeometry& geometry, const DepthSensor& sensor, const GainSampling& sampling = {});
-  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const GainSampling& sampling = {});
+  [[nodiscard]] static std::size_t required_bytes(const GridGeometry& geometry, const DepthSensor& sensor,
+                                                  const GainSampling& sampling = {});
 
   /// Takes the memory that contexts with a prior map need: prior_bytes().
   void allow_prior() { prior_plane_.emplace(geometry_); }
@@ -54,8 +64,17 @@ class GainModel {
     return GainPlane::required_bytes(geometry);
   }
 
-  /// Reads map, zone, free space and prior map (after allow_prior() only). Unknown voxels of the zone count; free ones
+  /// Learns from a frame where rays end outside of the map.
+  void learn_returns(const DepthImage& depth, const Transform<Base, Depth>& base_T_depth,
+                     std::span<const float> self_depth_m) {
+    far_.learn(depth, sensor_.intrinsics, base_T_depth, self_depth_m);
+  }
+
+  /// Reads map, zone, free space and prior map (after allow_prior() only). Unknown voxels of the zone in clusters that
+  /// are large enough count; free ones
   /// that motion cannot use yet count as `again`; voxels with futile_max futile looks stop rays like occupied ones.
+  /// Rays that have a known surface behind them count such a voxel still, until as many of their kind were futile, too:
+  /// a look into the open sky tells nothing, one past the same place towards a wall does.
   void prepare(const ViewContext& context);
 
   /// What a look at configuration q would tell on the prepared map. Rays end at the trusted range; nearer than the
@@ -72,6 +91,13 @@ class GainModel {
   [[nodiscard]] GainWorker worker() const { return {geometry_, rays_.ends_m.size()}; }
   /// Indices of unknown voxels of the zone that touch a free one and are not written off, ascending; from prepare().
   [[nodiscard]] std::span<const std::uint32_t> frontier() const { return frontier_; }
+  /// Whether only rays with a known surface behind count this unknown voxel; from prepare().
+  [[nodiscard]] bool needs_backing(std::size_t index) const {
+    return futile_.count(index) >= sampling_.futile_max && futile_.backed(index) < sampling_.futile_max;
+  }
+  /// Whether a ray along a unit direction meets a known surface within the sensor's range, in the map or beyond it.
+  [[nodiscard]] bool is_backed(const VoxelMap& map, const Eigen::Vector3d& from_m,
+                               const Eigen::Vector3d& direction) const;
   /// Unknown voxels of the zone; from prepare().
   [[nodiscard]] std::size_t unknown() const { return unknown_; }
 
@@ -79,6 +105,17 @@ class GainModel {
   /// The rays that no capsule of the body blocks; lives in the worker when some are.
   const GainRays& free_rays(const ViewContext& context, const LinkFrames& frames,
                             const Transform<Base, Depth>& base_T_depth, GainWorker& worker) const;
+  using Passed = FixedVector<std::uint32_t, 128>;
+  /// The unknown voxels that needs_backing() on a ray to `end` (base; `depth_m` along the optical axis), in order; none
+  /// when it has no backing.
+  [[nodiscard]] Passed pass_with_backing(const ViewContext& context, const Eigen::Vector3d& eye,
+                                         const Eigen::Vector3d& end, double depth_m) const;
+  /// Unknown voxels that needs_backing() and rays with backing see, beyond those counted on the plane.
+  [[nodiscard]] std::uint32_t count_backed(const ViewContext& context, const Transform<Base, Depth>& base_T_depth,
+                                           const GainRays& rays, GainScratch& scratch) const;
+  /// Of `rays` those that do not go where nothing returns, into the worker's.
+  const GainRays& returning_rays(const Transform<Base, Depth>& base_T_depth, const GainRays& rays,
+                                 GainWorker& worker) const;
   void find_frontier(const ViewContext& context);
   void prepare_prior(const ViewContext& context);
 
@@ -92,6 +129,8 @@ class GainModel {
   std::size_t unknown_ = 0;
   std::vector<std::uint32_t> frontier_;
   FutileLooks futile_;
+  FarReturns far_;
+  Eigen::AlignedBox3d backed_only_m_;  ///< around the voxels that needs_backing(); empty without any
 };
 
 }  // namespace firstlook

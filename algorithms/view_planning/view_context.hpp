@@ -41,10 +41,15 @@ struct ViewGain {
   std::uint32_t unknown = 0;           ///< unknown voxels of the zone, each once: what coverage counts
   std::uint32_t again = 0;             ///< free, but motion cannot use them, or not for long (safety rule 1)
   std::uint32_t expected_surface = 0;  ///< of `unknown`: where an earlier map has a surface
+  /// Of `unknown` and of `again`: on rays alone that end, by what has been seen, where nothing returns.
+  std::uint32_t doubtful = 0, doubtful_again = 0;
 
   /// A voxel that needs another look is half known for motion: it weighs a quarter of one that was never seen. One with
-  /// an expected surface weighs twice: it is where the space that is free will end.
-  [[nodiscard]] double weight() const { return unknown + 0.25 * again + expected_surface; }
+  /// an expected surface weighs twice: it is where the space that is free will end. What is doubtful weighs a tenth:
+  /// something that nobody has seen may stand in the way and return.
+  [[nodiscard]] double weight() const {
+    return unknown - 0.9 * doubtful + 0.25 * (again - 0.9 * doubtful_again) + expected_surface;
+  }
 };
 
 }  // namespace firstlook

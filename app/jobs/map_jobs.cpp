@@ -63,6 +63,7 @@ std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
   render_self_depth(std::span<const Capsule>(body.data(), body.size()), kSelfPadding_m, base_T_depth, camera,
                     self_depth_.items());
   const DepthImage depth{{pixels.data, pixels.width, pixels.height}, units_per_m};
+  chooser_.gain().learn_returns(depth, base_T_depth, self_depth_.items());
   if (open_rays_) open_rays_->look(depth, self_depth_.items());
   if (plane_fit_) pixels_fitted_ += plane_fit_->apply(pixels, units_per_m);
   if (filter_) {

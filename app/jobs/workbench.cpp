@@ -124,7 +124,8 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       zone_(geometry.count(), 0),
       revoked_field_(geometry, kFieldMax_m),
       chooser_(geometry, sensor_of(config, depth), config.explore.candidates, workers.workers(),
-               config.explore.certificate_samples),
+               config.explore.certificate_samples,
+               GainSampling{.cluster_voxels_min = config.explore.cluster_voxels_min}),
       swept_log_odds_(geometry.count(), kUnknownLogOdds),
       published_(geometry, kFieldMax_m) {
   take_options();
@@ -197,8 +198,9 @@ Status Workbench::take_memory() {
            std::pair{memory::Pool::kDistanceField,
                      2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor) + options},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
-           std::pair{memory::Pool::kViewCandidates, ViewChooser::required_bytes(g, config_.explore.candidates, 2,
-                                                                                config_.explore.certificate_samples)},
+           std::pair{memory::Pool::kViewCandidates,
+                     ViewChooser::required_bytes(g, sensor, config_.explore.candidates, 2,
+                                                 config_.explore.certificate_samples)},
            std::pair{memory::Pool::kPlannerNodes, 2 * Planner::required_bytes()},  // ours and the chooser's
            std::pair{memory::Pool::kCalibrationViews, views * view + kWaySightsMax * way_sight},
            std::pair{memory::Pool::kApplication, sizeof(Workbench) + kViewRecordsMax * sizeof(MappingViewRecord)},

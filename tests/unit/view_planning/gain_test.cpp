@@ -73,6 +73,78 @@ TEST_CASE("voxels that never answer stop attracting", "[gain]") {
   REQUIRE(model.count(world.context(), world.q, worker).unknown < 0.02 * before);
 }
 
+TEST_CASE("what looks into the open did not tell is still asked of rays with a surface behind", "[gain]") {
+  SmallWorld world(Truth{});
+  GainModel model(world.map.geometry(), world.sensor);
+  GainWorker worker = model.worker();
+  const auto gain = [&] {
+    model.prepare(world.context());
+    return model.count(world.context(), world.q, worker);
+  };
+  const std::uint32_t before = gain().unknown;
+  model.remember_look(world.context(), world.q, worker);
+  REQUIRE(gain().unknown < 0.02 * before);
+  // A wall, as if seen from elsewhere, where the sensor looks.
+  const Eigen::Vector3d axis = (forward(world.arm, world.q).flange() * world.mount).rotation().col(2);
+  REQUIRE(axis.x() > 0.5);
+  const GridGeometry& g = world.map.geometry();
+  std::size_t wall = 0;
+  for (std::size_t i = 0; i < world.map.size(); ++i) {
+    if (g.center_m(g.voxel_at(i)).x() > 1.4) world.map.set(i, VoxelClass::kOccupied, 0), wall = i;
+  }
+  REQUIRE(wall > 0);
+  CHECK(gain().unknown < 0.02 * before);  // nothing is known to return at all
+  std::vector<std::uint16_t> far(static_cast<std::size_t>(world.sensor.intrinsics.width) *
+                                     static_cast<std::size_t>(world.sensor.intrinsics.height),
+                                 4000);
+  model.learn_returns({{far.data(), world.sensor.intrinsics.width, world.sensor.intrinsics.height}, 1000},
+                      forward(world.arm, world.q).flange() * world.mount, {});
+  const std::uint32_t backed = gain().unknown;
+  CHECK(backed > 100);  // a quarter of the rays, the first voxel of each
+  model.remember_look(world.context(), world.q, worker);
+  CHECK(gain().unknown < 0.05 * before);  // they did not tell, either
+}
+
+TEST_CASE("what only rays into the open would tell is doubtful, and weighs little", "[gain]") {
+  SmallWorld world(Truth{});
+  GainModel model(world.map.geometry(), world.sensor);
+  GainWorker worker = model.worker();
+  model.prepare(world.context());
+  const ViewGain before = model.count(world.context(), world.q, worker);
+  REQUIRE(before.unknown > 1000);
+  CHECK(before.doubtful == 0);
+  const std::vector<std::uint16_t> nothing(static_cast<std::size_t>(world.sensor.intrinsics.width) *
+                                           static_cast<std::size_t>(world.sensor.intrinsics.height));
+  model.learn_returns({{nothing.data(), world.sensor.intrinsics.width, world.sensor.intrinsics.height}, 1000},
+                      forward(world.arm, world.q).flange() * world.mount, {});
+  const ViewGain after = model.count(world.context(), world.q, worker);
+  CHECK(after.unknown == before.unknown);  // the certificate that ends exploration still asks for it
+  CHECK(after.doubtful > 0.8 * after.unknown);
+  CHECK(after.weight() < 0.3 * before.weight());
+}
+
+TEST_CASE("specks of unknown voxels count nothing, clusters do", "[gain]") {
+  for (const int edge : {1, 2}) {  // 1 or 8 voxels
+    SmallWorld world(Truth::room());
+    const GridGeometry& g = world.map.geometry();
+    for (std::size_t i = 0; i < world.map.size(); ++i) world.map.set(i, VoxelClass::kFree, 0);
+    const Transform<Base, Depth> eye = forward(world.arm, world.q).flange() * world.mount;
+    const Eigen::Vector3i at = g.voxel(eye * Eigen::Vector3d(0, 0, 0.9));
+    for (int k = 0; k < edge * edge * edge; ++k) {
+      const std::size_t i = g.index(at + Eigen::Vector3i(k % edge, k / edge % edge, k / edge / edge));
+      REQUIRE(world.zone[i] == 1);
+      world.map.set(i, VoxelClass::kUnknown, 0);
+    }
+    GainModel model(g, world.sensor);
+    GainWorker worker = model.worker();
+    model.prepare(world.context());
+    const std::uint32_t unknown = model.count(world.context(), world.q, worker).unknown;
+    if (edge == 1) CHECK(unknown == 0);
+    if (edge == 2) CHECK(unknown >= 4);
+    CHECK(model.unknown() == static_cast<std::size_t>(edge * edge * edge));
+  }
+}
+
 TEST_CASE("the frontier is unknown and touches free space", "[gain]") {
   SmallWorld world(Truth::room());
   GainModel model(world.map.geometry(), world.sensor);
