@@ -107,7 +107,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   map_app
       ->add_option("--dataset", map_datasets,
                    "folder in TUM RGB-D layout; several, one for each sensor: --dataset A --dataset B")
-      ->expected(1);
+      ->allow_extra_args(false);
   map_app->add_option("--from", map_from, "a stored map instead: .bt or .ot");
   map_app->add_option("--resolution", map.resolution_m, "voxel size in metres")->capture_default_str();
   map_app->add_option("--max-range", map.range_max_m, "rays are cut here, metres")->capture_default_str();

@@ -36,7 +36,7 @@ struct Mock {
 };
 using MockColor = Mock<mock::MockColorCamera, std::uint8_t>;
 struct MockWithColors : MockColor {
-  MockWithColors() { camera.color = lossy.color = {{camera.gray, camera.gray, camera.gray}}; }
+  MockWithColors() { camera.color = std::array<std::uint8_t, 3>{camera.gray, camera.gray, camera.gray}; }
 };
 using MockDepth = Mock<mock::MockDepthCamera, std::uint16_t>;
 
