@@ -21,11 +21,12 @@ struct Leaves {
   Eigen::Vector3i size;
   int depth = kOctreeDepth;
   std::vector<std::int8_t> values;
+  std::vector<ColorSum> colors;  // of a ColorOcTree, else empty
 
-  [[nodiscard]] std::int8_t at(int x, int y, int z) const {
-    return values[(static_cast<std::size_t>(z) * static_cast<std::size_t>(size.y()) + static_cast<std::size_t>(y)) *
-                      static_cast<std::size_t>(size.x()) +
-                  static_cast<std::size_t>(x)];
+  [[nodiscard]] std::size_t index(int x, int y, int z) const {
+    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(size.y()) + static_cast<std::size_t>(y)) *
+               static_cast<std::size_t>(size.x()) +
+           static_cast<std::size_t>(x);
   }
 };
 
@@ -46,6 +47,7 @@ enum class Shape : std::uint8_t { kAbsent, kLeaf, kInner };
 struct NodeState {
   Shape shape = Shape::kAbsent;
   std::int8_t value = kUnknownLogOdds;
+  ColorSum color{};
 };
 
 NodeState state_of(const Leaves& leaves, const Node& node) {
@@ -55,13 +57,16 @@ NodeState state_of(const Leaves& leaves, const Node& node) {
   NodeState state;
   if ((low.array() >= high.array()).any()) return state;
   bool uniform = (high - low == Eigen::Vector3i::Constant(edge));
-  const std::int8_t first = leaves.at(low.x(), low.y(), low.z());
+  const std::size_t first = leaves.index(low.x(), low.y(), low.z());
   for (int z = low.z(); z < high.z(); ++z) {
     for (int y = low.y(); y < high.y(); ++y) {
       for (int x = low.x(); x < high.x(); ++x) {
-        const std::int8_t value = leaves.at(x, y, z);
-        uniform = uniform && value == first;
-        state.value = std::max(state.value, value);  // unknown is the smallest of all values
+        const std::size_t at = leaves.index(x, y, z);
+        uniform = uniform && leaves.values[at] == leaves.values[first];
+        state.value = std::max(state.value, leaves.values[at]);  // unknown is the smallest of all values
+        if (leaves.colors.empty()) continue;
+        uniform = uniform && leaves.colors[at].mean() == leaves.colors[first].mean();
+        if (const auto color = leaves.colors[at].mean()) state.color.add(*color);
       }
     }
   }
@@ -83,8 +88,8 @@ std::int8_t value_of(VoxelClass voxel_class) {
   return voxel_class == VoxelClass::kOccupied ? 1 : 0;
 }
 
-// Cuts the map at a depth: log-odds, or classes when there is a reading of them.
-Leaves cut(const VoxelMap& map, int depth, ClassReading reading) {
+// Cuts the map at a depth: log-odds, or classes when there is a reading of them; with the colours of what is occupied.
+Leaves cut(const VoxelMap& map, int depth, ClassReading reading, const ColorPlane* colors) {
   const GridGeometry& g = map.geometry();
   const int shift = kOctreeDepth - depth;
   Leaves leaves;
@@ -98,6 +103,7 @@ Leaves cut(const VoxelMap& map, int depth, ClassReading reading) {
   }
   const auto nx = static_cast<std::size_t>(leaves.size.x()), ny = static_cast<std::size_t>(leaves.size.y());
   leaves.values.assign(nx * ny * static_cast<std::size_t>(leaves.size.z()), kUnknownLogOdds);
+  if (colors != nullptr) leaves.colors.resize(leaves.values.size());
   std::size_t index = 0;
   for (int z = 0; z < g.size.z(); ++z) {
     for (int y = 0; y < g.size.y(); ++y) {
@@ -109,6 +115,8 @@ Leaves cut(const VoxelMap& map, int depth, ClassReading reading) {
         const auto k = static_cast<std::size_t>(((first.z() + z) >> shift) - leaves.first.z());
         std::int8_t& leaf = leaves.values[(k * ny + j) * nx + i];
         leaf = std::max(leaf, value);
+        if (colors == nullptr || map.voxel_class(index) != VoxelClass::kOccupied) continue;
+        if (const auto color = colors->at(index)) leaves.colors[(k * ny + j) * nx + i].add(*color);
       }
     }
   }
@@ -142,18 +150,22 @@ void write_binary_node(const Leaves& leaves, const Node& node, ByteSink sink) {
       write_binary_node(leaves, node.child(i, leaves.depth), sink);
 }
 
-// A little-endian float and one byte with a bit for each child, then the children.
+// A little-endian float, three bytes of a ColorOcTree, and one byte with a bit for each child; then the children.
 void write_full_node(const Leaves& leaves, const Node& node, const NodeState& state, ByteSink sink) {
   std::array<NodeState, 8> children{};
   if (state.shape == Shape::kInner) children = children_of(leaves, node);
   unsigned present = 0;
   for (unsigned i = 0; i < 8; ++i) present |= (children[i].shape != Shape::kAbsent ? 1u : 0u) << i;
   const auto value = std::bit_cast<std::uint32_t>(static_cast<float>(state.value * kLogOddsUnit));
-  const std::array<std::byte, 5> bytes = {static_cast<std::byte>(value & 0xff),
-                                          static_cast<std::byte>((value >> 8) & 0xff),
-                                          static_cast<std::byte>((value >> 16) & 0xff),
-                                          static_cast<std::byte>(value >> 24), static_cast<std::byte>(present)};
-  sink(bytes);
+  std::array<std::byte, 4 + 3 + 1> bytes = {
+      static_cast<std::byte>(value & 0xff), static_cast<std::byte>((value >> 8) & 0xff),
+      static_cast<std::byte>((value >> 16) & 0xff), static_cast<std::byte>(value >> 24)};
+  std::size_t size = 4;
+  if (!leaves.colors.empty())
+    for (const std::uint8_t channel : state.color.mean().value_or(kNoColor))
+      bytes[size++] = static_cast<std::byte>(channel);
+  bytes[size++] = static_cast<std::byte>(present);
+  sink(std::span(bytes).first(size));
   for (int i = 0; i < 8; ++i) {
     const NodeState& child = children[static_cast<std::size_t>(i)];
     if (child.shape != Shape::kAbsent) write_full_node(leaves, node.child(i, leaves.depth), child, sink);
@@ -172,15 +184,16 @@ void write_file(const Leaves& leaves, bool binary, double resolution_m, ByteSink
   const bool empty = state_of(leaves, kRoot).shape == Shape::kAbsent;
   const std::string header = fmt::format(
       "# Octomap OcTree {}file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
-      "id OcTree\nsize {}\nres {}\ndata\n",
-      binary ? "binary " : "", empty ? 0 : count_nodes(leaves, kRoot), resolution_m);
+      "id {}\nsize {}\nres {}\ndata\n",
+      binary ? "binary " : "", leaves.colors.empty() ? "OcTree" : "ColorOcTree", empty ? 0 : count_nodes(leaves, kRoot),
+      resolution_m);
   sink(std::as_bytes(std::span(header)));
   write_nodes(leaves, binary, sink);
 }
 
-Leaves checked_cut(const VoxelMap& map, int depth, ClassReading reading) {
+Leaves checked_cut(const VoxelMap& map, int depth, ClassReading reading, const ColorPlane* colors = nullptr) {
   ENSURE(3051, depth >= 1 && depth <= kOctreeDepth);
-  return cut(map, depth, reading);
+  return cut(map, depth, reading, colors);
 }
 
 }  // namespace
@@ -191,6 +204,10 @@ void write_bt(const VoxelMap& map, ClassReading reading, int depth, ByteSink sin
 
 void write_ot(const VoxelMap& map, int depth, ByteSink sink) {
   write_file(checked_cut(map, depth, nullptr), false, map.geometry().resolution_m, sink);
+}
+
+void write_color_ot(const VoxelMap& map, const ColorPlane& colors, int depth, ByteSink sink) {
+  write_file(checked_cut(map, depth, nullptr, &colors), false, map.geometry().resolution_m, sink);
 }
 
 void write_bt_nodes(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink) {

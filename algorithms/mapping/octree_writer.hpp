@@ -3,6 +3,7 @@
 
 #include "algorithms/mapping/byte_sink.hpp"
 #include "algorithms/mapping/class_reading.hpp"
+#include "algorithms/mapping/map_planes.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 
 namespace firstlook {
@@ -17,6 +18,10 @@ void write_bt(const VoxelMap& map, ClassReading reading, int depth, ByteSink sin
 
 /// `.ot`: with log-odds in OctoMap's units, which know nothing of octants; depth as above.
 void write_ot(const VoxelMap& map, int depth, ByteSink sink);
+
+/// The same as a ColorOcTree: occupied voxels have their colours, all else is white, which OctoMap takes for no colour.
+/// Only blocks of one value and one colour are pruned; a node above several has the mean of its coloured voxels.
+void write_color_ot(const VoxelMap& map, const ColorPlane& colors, int depth, ByteSink sink);
 
 /// The nodes of the same files without their header: what OctoMap calls binary data and data, and messages carry.
 void write_bt_nodes(const VoxelMap& map, ClassReading reading, int depth, ByteSink sink);

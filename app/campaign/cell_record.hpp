@@ -37,6 +37,8 @@ struct CellFigures {
   std::optional<double> coverage_of_observable;
   std::optional<double> robot_time_s;  ///< end of the last phase
   std::optional<double> views, calibration_views;
+  std::optional<double> time_to_95_s, views_to_95, time_to_99_s,
+      views_to_99;  ///< of the observable, since mapping began
   std::optional<double> hand_eye_error_mm, hand_eye_error_mrad, hand_eye_mahalanobis2;
   std::optional<double> min_clearance_m;
   std::optional<double> false_free_voxels, false_occupied_fraction;
@@ -53,10 +55,14 @@ struct FigureColumn {
   std::optional<double> CellFigures::* value;
   Worst worst;
 };
-inline constexpr std::array<FigureColumn, 12> kFigureColumns = {{
+inline constexpr std::array<FigureColumn, 16> kFigureColumns = {{
     {"coverage_of_observable", "/truth/coverage_of_observable", &CellFigures::coverage_of_observable, Worst::kLowest},
     {"robot_time_s", "", &CellFigures::robot_time_s, Worst::kHighest},
     {"views", "/mapping/views", &CellFigures::views, Worst::kHighest},
+    {"time_to_95_s", "/truth/to_95/time_s", &CellFigures::time_to_95_s, Worst::kHighest},
+    {"views_to_95", "/truth/to_95/views", &CellFigures::views_to_95, Worst::kNotAsked},
+    {"time_to_99_s", "/truth/to_99/time_s", &CellFigures::time_to_99_s, Worst::kHighest},
+    {"views_to_99", "/truth/to_99/views", &CellFigures::views_to_99, Worst::kNotAsked},
     {"calibration_views", "/hand_eye/views", &CellFigures::calibration_views, Worst::kNotAsked},
     {"hand_eye_error_mm", "/truth/hand_eye_error_mm", &CellFigures::hand_eye_error_mm, Worst::kHighest},
     {"hand_eye_error_mrad", "/truth/hand_eye_error_mrad", &CellFigures::hand_eye_error_mrad, Worst::kHighest},

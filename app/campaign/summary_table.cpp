@@ -15,10 +15,14 @@ struct Row {
   double factor;
   int digits;
 };
-constexpr std::array<Row, 9> kRows = {{
+constexpr std::array<Row, 13> kRows = {{
     {"observable known, %", &CellFigures::coverage_of_observable, 100, 2},
     {"robot's time, s", &CellFigures::robot_time_s, 1, 0},
     {"views", &CellFigures::views, 1, 0},
+    {"mapping to 95 %, s", &CellFigures::time_to_95_s, 1, 0},
+    {"views to 95 %", &CellFigures::views_to_95, 1, 0},
+    {"mapping to 99 %, s", &CellFigures::time_to_99_s, 1, 0},
+    {"views to 99 %", &CellFigures::views_to_99, 1, 0},
     {"hand-eye error, mm", &CellFigures::hand_eye_error_mm, 1, 3},
     {"hand-eye error, mrad", &CellFigures::hand_eye_error_mrad, 1, 3},
     {"Mahalanobis squared", &CellFigures::hand_eye_mahalanobis2, 1, 1},

@@ -129,22 +129,33 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   calibrate_app->add_flag("--json", calibrate.json, "print the hand_eye object on stdout");
 
   MapCommandOptions map;
-  std::string map_dataset, map_from, map_prior, map_out;
+  std::vector<std::string> map_datasets;
+  std::string map_from, map_prior, map_out;
   CLI::App* map_app = app.add_subcommand("map", "a map from recorded depth frames or a file, and what is in it");
-  map_app->add_option("--dataset", map_dataset, "folder in TUM RGB-D layout");
+  map_app
+      ->add_option("--dataset", map_datasets,
+                   "folder in TUM RGB-D layout; several, one for each sensor: --dataset A --dataset B")
+      ->allow_extra_args(false);
   map_app->add_option("--from", map_from, "a stored map instead: .bt or .ot");
   map_app->add_option("--resolution", map.resolution_m, "voxel size in metres")->capture_default_str();
   map_app->add_option("--max-range", map.range_max_m, "rays are cut here, metres")->capture_default_str();
   map_app->add_flag("--sort", map.sort, "depth.txt is not in the order of time: sort it, instead of refusing frames");
   map_app->add_option("--prior-map", map_prior, "an earlier map, .bt or .ot: say what changed since");
+  map_app
+      ->add_option("--planes", map.planes,
+                   "what to keep for each voxel of a dataset's map, with commas between: color (from rgb.txt), label "
+                   "(the object), sensor (that saw it last)")
+      ->capture_default_str();
   map_app->add_flag("--objects", map.objects, "list connected occupied voxels as planes, boxes and others");
   map_app
       ->add_option("--move", map.moves,
                    "ID,dx,dy,dz: move an object of --objects, metres; what it uncovers becomes unknown")
       ->allow_extra_args(false);
   map_app->add_option("--at", map.at, "X,Y,Z: what is known of a place, metres");
-  map_app->add_option("--out", map_out,
-                      "folder for collision_map.bt, map.ot, map.ply; frames.csv of a dataset; objects.png");
+  map_app->add_option(
+      "--out", map_out,
+      "folder for collision_map.bt, map.ot, map.ply; frames.csv of a dataset; objects.png; with colours "
+      "color_map.ot, color.png");
   map_app->add_option("--depth", map.depth, "cut the trees of --out at this depth: 16 whole, 15 twice as coarse ..")
       ->capture_default_str();
   map_app->add_flag("--json", map.json, "print the counts as JSON");
@@ -228,7 +239,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   }
   if (calibrate_app->parsed()) return {calibrate, 0};
   if (map_app->parsed()) {
-    map.dataset = map_dataset;
+    map.datasets.assign(map_datasets.begin(), map_datasets.end());
     map.from = map_from;
     map.prior = map_prior;
     map.out = map_out;

@@ -31,6 +31,7 @@ struct Found {
   std::string camera_info;
   std::optional<VoxelMap> collision_map;  ///< collision_map.bt: to plan with
   std::optional<VoxelMap> map;            ///< map.ot: with log-odds
+  MapPlanes planes;                       ///< of map, from map.ply
 };
 
 Result<std::optional<VoxelMap>> read_map(const std::filesystem::path& file) {
@@ -61,6 +62,13 @@ Result<Found> find(const std::filesystem::path& run) {
     Result<std::optional<VoxelMap>> read = read_map(run / name);
     if (!read) return std::unexpected(read.error());
     *map = std::move(*read);
+  }
+  if (found.map) {
+    Result<MapPlanes> planes = read_planes_beside(run / "map.ot", found.map->geometry());
+    if (planes)
+      found.planes = std::move(*planes);
+    else
+      fmt::print(stderr, "planes left out: {}\n", planes.error().detail());
   }
   return found;
 }
@@ -139,7 +147,7 @@ void to_ur(const Found& found, Folder& folder) {
 
 void to_csv(const Found& found, Folder& folder) {
   if (found.hand_eye) folder.add("hand_eye.csv", hand_eye_csv(*found.hand_eye));
-  if (found.map) folder.add("voxels.csv", [&](ByteSink sink) { write_voxels_csv(*found.map, sink); });
+  if (found.map) folder.add("voxels.csv", [&](ByteSink sink) { write_voxels_csv(*found.map, sink, found.planes); });
   if (!found.collision_map) return;
   folder.add("boxes.csv", boxes_csv(merge_occupied(*found.collision_map, octomap_class)));
   folder.add("objects.csv", objects_csv(find_objects(*found.collision_map, octomap_class)));

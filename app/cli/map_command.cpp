@@ -13,6 +13,7 @@
 #include "algorithms/mapping/objects.hpp"
 #include "app/dataset/dataset_mapping.hpp"
 #include "app/dataset/map_file.hpp"
+#include "app/report/color_picture.hpp"
 #include "app/report/map_files.hpp"
 #include "app/report/map_json.hpp"
 #include "app/report/object_picture.hpp"
@@ -33,6 +34,7 @@ constexpr std::size_t kRefusedNarrated = 10;
 
 /// What the options ask about the map.
 struct Questions {
+  PlaneChoice planes;
   std::optional<Eigen::Vector3d> place_m;
   std::vector<ObjectMove> moves;
 };
@@ -40,7 +42,8 @@ struct Questions {
 /// A map, where it comes from, and the answers.
 struct Answers {
   VoxelMap map;
-  std::optional<MappingDataset> dataset;
+  MapPlanes planes;
+  std::vector<SensorRecording> recordings;  ///< none: a stored map
   std::vector<FrameOutcome> frames;
   std::size_t frames_refused = 0;
   std::optional<PlaceSeen> seen;
@@ -65,6 +68,11 @@ bool read_numbers(std::string_view text, std::span<double> numbers) {
 
 Result<Questions> read_questions(const MapCommandOptions& options) {
   Questions questions;
+  const std::optional<PlaneChoice> planes = planes_from_words(options.planes);
+  if (!planes)
+    return failure(Fault::kUsage, "--planes {}: none, or color, label, sensor with commas between them",
+                   options.planes);
+  questions.planes = *planes;
   if (!options.at.empty()) {
     std::array<double, 3> p{};
     if (!read_numbers(options.at, p) || Eigen::Vector3d(p.data()).cwiseAbs().maxCoeff() > kPlaceMax_m)
@@ -81,8 +89,12 @@ Result<Questions> read_questions(const MapCommandOptions& options) {
 }
 
 Status check_options(const MapCommandOptions& options) {
-  if (options.dataset.empty() == options.from.empty())
+  if (options.datasets.empty() == options.from.empty())
     return failure(Fault::kUsage, "either --dataset DIR or --from FILE");
+  if (options.datasets.size() > kSensorsMax)
+    return failure(Fault::kUsage, "--dataset {} times: at most {} sensors", options.datasets.size(), kSensorsMax);
+  if (!options.from.empty() && options.planes != "none")
+    return failure(Fault::kUsage, "--planes {}: a stored map has those of the map.ply beside it", options.planes);
   if (!(options.resolution_m >= kResolutionMin_m && options.resolution_m <= kResolutionMax_m))
     return failure(Fault::kUsage, "--resolution {}: must be {} to {} m", options.resolution_m, kResolutionMin_m,
                    kResolutionMax_m);
@@ -99,6 +111,7 @@ void narrate(const FrameOutcome& frame) {
   fmt::print(stderr, "{}: {} pixels used, {} voxels discovered; {} free, {} occupied\n", frame.image,
              frame.inserted.pixels_used, frame.inserted.change.voxels_discovered, frame.voxels.free,
              frame.voxels.occupied);
+  if (!frame.color_refused.empty()) fmt::print(stderr, "without colours: {}\n", frame.color_refused);
 }
 
 void narrate(std::string_view what, const std::vector<RefusedLine>& refused) {
@@ -108,19 +121,45 @@ void narrate(std::string_view what, const std::vector<RefusedLine>& refused) {
     fmt::print(stderr, "refused: {} more {}\n", refused.size() - kRefusedNarrated, what);
 }
 
-Result<Answers> from_dataset(const MapCommandOptions& options, const Questions& questions) {
-  Result<MappingDataset> dataset =
-      read_mapping_dataset(options.dataset, options.sort ? FrameOrder::kByStamp : FrameOrder::kAsRecorded);
-  if (!dataset) return std::unexpected(dataset.error());
-  narrate("poses", dataset->refused_poses);
-  narrate("frames", dataset->refused);
-  if (dataset->poses_were_sorted) fmt::print(stderr, "groundtruth.txt is not in the order of time: sorted\n");
+Result<SensorRecording> read_recording(const std::filesystem::path& folder, const MapCommandOptions& options,
+                                       const Questions& questions) {
+  Result<MappingDataset> depth =
+      read_mapping_dataset(folder, options.sort ? FrameOrder::kByStamp : FrameOrder::kAsRecorded);
+  if (!depth) return std::unexpected(depth.error());
+  narrate("poses", depth->refused_poses);
+  narrate("frames", depth->refused);
+  if (depth->poses_were_sorted) fmt::print(stderr, "groundtruth.txt is not in the order of time: sorted\n");
+  SensorRecording recording{std::move(*depth), std::nullopt};
+  if (!questions.planes.color) return recording;
+  Result<ColorDataset> color = read_color_dataset(folder, recording.depth);
+  if (!color) return std::unexpected(color.error());
+  narrate("pictures", color->refused);
+  recording.color = std::move(*color);
+  return recording;
+}
+
+Result<Answers> from_datasets(const MapCommandOptions& options, const Questions& questions) {
+  std::vector<SensorRecording> recordings;
+  for (const std::filesystem::path& folder : options.datasets) {
+    if (options.datasets.size() > 1) fmt::print(stderr, "sensor {}: {}\n", recordings.size() + 1, folder.string());
+    Result<SensorRecording> recording = read_recording(folder, options, questions);
+    if (!recording) return std::unexpected(recording.error());
+    recordings.push_back(std::move(*recording));
+  }
   const auto report = [](const FrameOutcome& frame) { narrate(frame); };
   Result<DatasetMap> mapped =
-      map_dataset(*dataset, {options.resolution_m, options.range_max_m, questions.place_m}, report);
+      map_dataset(recordings, {options.resolution_m, options.range_max_m, questions.place_m, questions.planes}, report);
   if (!mapped) return std::unexpected(mapped.error());
   const std::size_t refused = mapped->refused();
-  Answers answers{std::move(mapped->map), std::move(*dataset), std::move(mapped->frames), refused, {}, {}, {}, {}};
+  Answers answers{std::move(mapped->map),
+                  std::move(mapped->planes),
+                  std::move(recordings),
+                  std::move(mapped->frames),
+                  refused,
+                  {},
+                  {},
+                  {},
+                  {}};
   if (questions.place_m) answers.seen = mapped->place;
   return answers;
 }
@@ -128,20 +167,25 @@ Result<Answers> from_dataset(const MapCommandOptions& options, const Questions& 
 Result<Answers> from_file(const MapCommandOptions& options) {
   Result<VoxelMap> map = read_map_file(options.from, kOfflineVoxelsMax);
   if (!map) return std::unexpected(map.error());
-  return Answers{std::move(*map), {}, {}, 0, {}, {}, {}, {}};
+  Result<MapPlanes> planes = read_planes_beside(options.from, map->geometry());
+  if (!planes) fmt::print(stderr, "planes left out: {}\n", planes.error().detail());
+  return Answers{std::move(*map), planes ? std::move(*planes) : MapPlanes{}, {}, {}, 0, {}, {}, {}, {}};
 }
 
 Status answer(const MapCommandOptions& options, const Questions& questions, Answers& answers) {
-  if (options.objects || questions.place_m || !questions.moves.empty())
+  if (options.objects || questions.place_m || !questions.moves.empty() || answers.planes.choice().any())
     answers.objects = find_objects(answers.map, collision_class);
   if (!questions.moves.empty()) {
     Result<VoxelMap> moved = move_objects(answers.map, *answers.objects, questions.moves, kOfflineVoxelsMax);
     if (!moved) return std::unexpected(moved.error());
     answers.map = std::move(*moved);
     answers.objects = find_objects(answers.map, collision_class);
+    if (answers.planes.choice().any()) fmt::print(stderr, "the planes do not move with the objects: left out\n");
+    answers.planes = {};
   }
+  if (answers.planes.label) answers.planes.label->write(*answers.objects);
   if (questions.place_m) {
-    answers.place = look_up(answers.map, *questions.place_m, &*answers.objects);
+    answers.place = look_up(answers.map, *questions.place_m, &*answers.objects, answers.planes);
     answers.place->seen = answers.seen;
   }
   if (!options.prior.empty()) {
@@ -156,8 +200,14 @@ Status answer(const MapCommandOptions& options, const Questions& questions, Answ
 
 Status write_files(const MapCommandOptions& options, const Answers& answers) {
   const std::string folder = options.out.string();
-  Status status = write_map_files(folder, answers.map, options.depth);
-  if (status && answers.dataset) status = write_file_atomically(folder + "/frames.csv", frames_csv(answers.frames));
+  Status status = write_map_files(folder, answers.map, options.depth, answers.planes);
+  if (status && answers.planes.color) {
+    const MapPicture picture =
+        color_picture(answers.map, *answers.planes.color, *answers.objects, kPictureAzimuth_rad, "colours");
+    status = write_file_atomically(folder + "/color.png", encode_png(picture.picture));
+  }
+  if (status && !answers.recordings.empty())
+    status = write_file_atomically(folder + "/frames.csv", frames_csv(answers.frames));
   if (!status || !options.objects) return status;
   const MapPicture picture = object_picture(answers.map, *answers.objects, kPictureAzimuth_rad, "objects");
   return write_file_atomically(folder + "/objects.png", encode_png(picture.picture));
@@ -173,28 +223,47 @@ Json frames_refused_json(const std::vector<FrameOutcome>& frames) {
   return refused;
 }
 
-Json poses_refused_json(const std::vector<RefusedLine>& poses) {
-  Json refused = Json::array();
-  for (const RefusedLine& pose : poses) refused.push_back({{"line", pose.line}, {"reason", pose.reason}});
-  return refused;
+void add_lines(const std::vector<RefusedLine>& lines, Json& refused) {
+  for (const RefusedLine& line : lines) refused.push_back({{"line", line.line}, {"reason", line.reason}});
+}
+
+Json color_json(const FrameOutcome& frame) {
+  const Json refused = frame.color_refused.empty() ? Json(nullptr) : Json(frame.color_refused);
+  return {{"pixels", frame.pixels_colored}, {"refused", refused}};
+}
+
+/// What the recordings say of themselves.
+void add_frames(const Answers& answers, Json& result) {
+  Json& frames = result["frames"] = Json::array();
+  for (const FrameOutcome& frame : answers.frames) {
+    if (!frame.refused.empty()) continue;
+    Json& json = frames.emplace_back(frame_json(frame));
+    if (answers.recordings.size() > 1) json["sensor"] = frame.sensor;
+    if (answers.planes.color) json["color"] = color_json(frame);
+  }
+  std::size_t without_pose = 0;
+  Json poses_refused = Json::array(), pictures_refused = Json::array();
+  for (const SensorRecording& recording : answers.recordings) {
+    without_pose += recording.depth.frames_without_pose;
+    add_lines(recording.depth.refused_poses, poses_refused);
+    if (recording.color) add_lines(recording.color->refused, pictures_refused);
+  }
+  result["frames_without_pose"] = without_pose;
+  result["frames_refused"] = answers.frames_refused;
+  result["refused"] = frames_refused_json(answers.frames);
+  result["poses_refused"] = poses_refused;
+  if (answers.planes.color) result["pictures_refused"] = pictures_refused;
+  result["association_s"] = kPoseAssociation_s;
+  result["interpolation_max_s"] = kPoseInterpolation_s;
 }
 
 Json result_json(const MapCommandOptions& options, const Answers& answers) {
   Json result = {{"resolution_m", answers.map.geometry().resolution_m}};
-  if (answers.dataset) result["range_max_m"] = options.range_max_m;
+  if (!answers.recordings.empty()) result["range_max_m"] = options.range_max_m;
   result["extents_m"] = extents_json(answers.map.geometry());
-  if (answers.dataset) {
-    Json& frames = result["frames"] = Json::array();
-    for (const FrameOutcome& frame : answers.frames)
-      if (frame.refused.empty()) frames.push_back(frame_json(frame));
-    result["frames_without_pose"] = answers.dataset->frames_without_pose;
-    result["frames_refused"] = answers.frames_refused;
-    result["refused"] = frames_refused_json(answers.frames);
-    result["poses_refused"] = poses_refused_json(answers.dataset->refused_poses);
-    result["association_s"] = kPoseAssociation_s;
-    result["interpolation_max_s"] = kPoseInterpolation_s;
-  }
+  if (!answers.recordings.empty()) add_frames(answers, result);
   result["voxels"] = counts_json(answers.map.counts());
+  if (answers.planes.choice().any()) result["planes"] = planes_json(count_planes(answers.map, answers.planes));
   if (options.objects) {
     result["objects"] = objects_json(*answers.objects);
     result["specks"] = answers.objects->specks;
@@ -206,10 +275,11 @@ Json result_json(const MapCommandOptions& options, const Answers& answers) {
 
 void print_text(const MapCommandOptions& options, const Answers& answers) {
   const VoxelCounts counts = answers.map.counts();
-  if (answers.dataset)
+  if (!answers.recordings.empty())
     fmt::print("{} frames, {} refused, at ", answers.frames.size() - answers.frames_refused, answers.frames_refused);
   fmt::print("{} m: {} voxels free, {} occupied, {} unknown\n", answers.map.geometry().resolution_m, counts.free,
              counts.occupied, counts.unknown);
+  if (answers.planes.choice().any()) fmt::print("{}", planes_text(count_planes(answers.map, answers.planes)));
   if (options.objects) fmt::print("{}", objects_text(*answers.objects));
   if (answers.place) fmt::print("{}", place_text(*answers.place));
   if (answers.change) {
@@ -230,7 +300,7 @@ int run_map_command(const MapCommandOptions& options) {
   if (const Status status = check_options(options); !status) return report(status.error());
   const Result<Questions> questions = read_questions(options);
   if (!questions) return report(questions.error());
-  Result<Answers> answers = options.from.empty() ? from_dataset(options, *questions) : from_file(options);
+  Result<Answers> answers = options.from.empty() ? from_datasets(options, *questions) : from_file(options);
   if (!answers) return report(answers.error());
   if (const Status status = answer(options, *questions, *answers); !status) return report(status.error());
   if (!options.out.empty())

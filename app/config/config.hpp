@@ -141,6 +141,7 @@ struct Config {
     std::array<double, 3> fine_high_m{};
     double ground_height_m = 0;     ///< of a level floor that clears only
     double ground_tolerance_m = 0;  ///< 0: the floor is mapped as anything else
+    std::string planes = "none";    ///< words of planes_from_words (map_planes.hpp): color, label, sensor
     std::string prior = "none";     ///< .bt or .ot of an earlier map of the cell; none: there is none
     bool operator==(const Map&) const = default;
   } map;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "algorithms/calibration/solvers/solver_table.hpp"
+#include "algorithms/mapping/map_planes.hpp"
 #include "algorithms/mapping/sensor_presets.hpp"
 #include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
@@ -296,6 +297,13 @@ void add_map_keys(Keys& keys, Config& c) {
                   "side of a voxel of a second, finer map of a part of the cell, fine_map.bt; 0: none"});
   keys.push_back({"map.fine_low_m", &c.map.fine_low_m, -10, 10, {}, "corner of that part in base"});
   keys.push_back({"map.fine_high_m", &c.map.fine_high_m, -10, 10, {}, "opposite corner"});
+  keys.push_back({"map.planes",
+                  &c.map.planes,
+                  0,
+                  0,
+                  {},
+                  "what is kept for each voxel besides, with commas between: color (mean of the points that hit it, of "
+                  "looks at rest; 16 bytes), label (its object; 4), sensor (that saw it last; 1); none: nothing"});
   keys.push_back({"map.prior",
                   &c.map.prior,
                   0,
@@ -424,6 +432,7 @@ std::string broken_rule(const Config& c) {
     }
   }
   if (std::string rule = broken_fine_map_rule(c.map); !rule.empty()) return rule;
+  if (!planes_from_words(c.map.planes)) return "map.planes must be none, or color, label, sensor with commas between";
   if (c.depth.crop_m > 0 && c.depth.crop_m <= c.depth.range_min_m) return "depth.crop_m must exceed depth.range_min_m";
   if (c.depth.filter_voxel_m > 0 && c.depth.filter_voxel_m < 0.005) {
     return "depth.filter_voxel_m must be 0 or at least 0.005";

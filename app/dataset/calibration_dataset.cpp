@@ -11,7 +11,7 @@
 #include "algorithms/vision/target_detection.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/dataset/csv_table.hpp"
-#include "app/dataset/gray_image_file.hpp"
+#include "app/dataset/picture_file.hpp"
 
 namespace firstlook {
 namespace {

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
+
+#include "platform/core/ensure.hpp"
 
 namespace firstlook {
 namespace {
@@ -54,8 +57,9 @@ Result<LoadedFrame> load(const MappingFrame& frame, const MappingDataset& datase
   return loaded;
 }
 
-FrameOutcome outcome_of(const MappingFrame& frame) {
+FrameOutcome outcome_of(const MappingFrame& frame, int sensor) {
   FrameOutcome outcome;
+  outcome.sensor = sensor;
   outcome.line = frame.line;
   outcome.stamp_s = frame.stamp_s;
   outcome.image = frame.image.filename().string();
@@ -66,13 +70,14 @@ std::string reason_of(const FrameOutcome& frame, const Error& error) {
   return fmt::format("depth.txt:{}: {}: {}", frame.line, frame.image, error.detail());
 }
 
-// The box of every ray of the frames that can be used; notes why the others cannot.
-Result<AxisBox> find_extents(const MappingDataset& dataset, DepthRays& rays, double resolution_m,
-                             std::vector<FrameOutcome>& outcomes) {
-  AxisBox box{Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()),
-              Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity())};
+const AxisBox kNoBox{Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()),
+                     Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity())};
+
+// Widens the box to every ray of the frames that can be used; notes why the others cannot.
+void widen(AxisBox& box, const MappingDataset& dataset, DepthRays rays, double resolution_m, int sensor,
+           std::vector<FrameOutcome>& outcomes) {
   for (const MappingFrame& frame : dataset.frames) {
-    FrameOutcome& outcome = outcomes.emplace_back(outcome_of(frame));
+    FrameOutcome& outcome = outcomes.emplace_back(outcome_of(frame, sensor));
     const Result<LoadedFrame> loaded = load(frame, dataset);
     Status status;
     if (!loaded)
@@ -90,12 +95,9 @@ Result<AxisBox> find_extents(const MappingDataset& dataset, DepthRays& rays, dou
     box.low_m = box.low_m.cwiseMin(bounds.low_m);
     box.high_m = box.high_m.cwiseMax(bounds.high_m);
   }
-  if (!box.low_m.allFinite())
-    return failure(Fault::kDataMalformed, "no frame can be used; the first: {}", outcomes.front().refused);
-  return box;
 }
 
-Result<GridGeometry> fit_grid(const AxisBox& box, double resolution_m) {
+Result<GridGeometry> fit_grid(const AxisBox& box, double resolution_m, const PlaneChoice& planes) {
   // One voxel on each side, for points on a boundary.
   const Eigen::Vector3d margin_m = Eigen::Vector3d::Constant(resolution_m);
   const Eigen::Vector3d low = box.low_m - margin_m, high = box.high_m + margin_m;
@@ -108,6 +110,13 @@ Result<GridGeometry> fit_grid(const AxisBox& box, double resolution_m) {
         "need {:.0f} MiB; at most {:.0f} MiB are taken",
         voxels.x(), voxels.y(), voxels.z(), resolution_m, low.x(), low.y(), low.z(), high.x(), high.y(), high.z(),
         voxels.prod() * kBytesPerVoxel / kMiB, static_cast<double>(kOfflineVoxelsMax) * kBytesPerVoxel / kMiB);
+  const double plane_bytes = voxels.prod() * static_cast<double>(planes.bytes_per_voxel());
+  if (plane_bytes > static_cast<double>(kOfflinePlaneBytesMax))
+    return failure(Fault::kMapTooLarge,
+                   "{:.0f} x {:.0f} x {:.0f} voxels of {} m with planes of {} bytes each need {:.0f} MiB for them; at "
+                   "most {:.0f} MiB are taken",
+                   voxels.x(), voxels.y(), voxels.z(), resolution_m, planes.bytes_per_voxel(), plane_bytes / kMiB,
+                   static_cast<double>(kOfflinePlaneBytesMax) / kMiB);
   return GridGeometry::covering(low, high, resolution_m);
 }
 
@@ -140,10 +149,65 @@ class PlaceWatch {
   Inserter inserter_;
 };
 
+// Puts the frames of one sensor into the map and its planes.
+class RecordingMapper {
+ public:
+  RecordingMapper(const SensorRecording& recording, const DatasetMappingOptions& options, DatasetMap& mapped)
+      : recording_(recording),
+        mapped_(mapped),
+        inserter_(mapped.map.geometry(), offline_sensor(recording.depth, options.range_max_m)) {
+    if (options.place_m) watch_.emplace(*options.place_m, options.resolution_m, inserter_.sensor());
+    if (mapped.planes.color)
+      registration_.emplace(mapped.map.geometry(), inserter_.sensor(), recording.color->sensor.intrinsics);
+  }
+
+  // An error only for a picture that was readable a moment ago.
+  Status map(std::size_t index, FrameOutcome& outcome) {
+    const MappingFrame& frame = recording_.depth.frames[index];
+    const Result<LoadedFrame> loaded = load(frame, recording_.depth);
+    if (!loaded) return std::unexpected(loaded.error());
+    const DepthImage depth = loaded->image.view(recording_.depth.units_per_m);
+    const Result<InsertionResult> result = inserter_.insert(mapped_.map, depth, frame.map_T_depth, {}, frame.stamp_s);
+    outcome.pixels_saturated = loaded->pixels_saturated;
+    if (!result) {
+      outcome.refused = reason_of(outcome, result.error());
+      return {};
+    }
+    outcome.inserted = *result;
+    if (watch_) watch_->see(depth, frame, mapped_.place);
+    if (mapped_.planes.sensor)
+      mapped_.planes.sensor->note(inserter_.missed(), inserter_.hit(), static_cast<std::uint8_t>(outcome.sensor));
+    if (registration_) color(depth, frame, recording_.color->of_frame[index], outcome);
+    return {};
+  }
+
+ private:
+  void color(const DepthImage& depth, const MappingFrame& frame, const ColorPicture& picture, FrameOutcome& outcome) {
+    if (picture.file.empty()) {
+      outcome.color_refused = fmt::format("rgb.txt: no picture within {} s", kPoseAssociation_s);
+      return;
+    }
+    const Result<ColorPixels> pixels = read_color_picture(*recording_.color, picture);
+    if (!pixels) {
+      outcome.color_refused = pixels.error().detail();
+      return;
+    }
+    outcome.pixels_colored = registration_->add(*mapped_.planes.color, depth, frame.map_T_depth, {},
+                                                recording_.color->sensor, pixels->view(), inserter_.hit());
+  }
+
+  const SensorRecording& recording_;
+  DatasetMap& mapped_;
+  Inserter inserter_;
+  std::optional<PlaceWatch> watch_;
+  std::optional<ColorRegistration> registration_;
+};
+
 // The dataset's own refusals among the frames, in the order of depth.txt.
-void add_refused_lines(const MappingDataset& dataset, std::vector<FrameOutcome>& outcomes) {
+void add_refused_lines(const MappingDataset& dataset, int sensor, std::vector<FrameOutcome>& outcomes) {
   for (const RefusedLine& line : dataset.refused) {
     FrameOutcome outcome;
+    outcome.sensor = sensor;
     outcome.line = line.line;
     outcome.stamp_s = line.stamp_s;
     outcome.image = std::filesystem::path(line.image).filename().string();
@@ -160,43 +224,37 @@ std::size_t DatasetMap::refused() const {
       std::ranges::count_if(frames, [](const FrameOutcome& frame) { return !frame.refused.empty(); }));
 }
 
-Result<DatasetMap> map_dataset(const MappingDataset& dataset, const DatasetMappingOptions& options,
+Result<DatasetMap> map_dataset(std::span<const SensorRecording> recordings, const DatasetMappingOptions& options,
                                FunctionRef<void(const FrameOutcome&)> report) {
-  const DepthSensor sensor = offline_sensor(dataset, options.range_max_m);
-  DepthRays rays(sensor);
-  std::vector<FrameOutcome> outcomes;
-  const Result<AxisBox> extents = find_extents(dataset, rays, options.resolution_m, outcomes);
-  if (!extents) return std::unexpected(extents.error());
-  const Result<GridGeometry> geometry = fit_grid(*extents, options.resolution_m);
+  ENSURE(7302, !recordings.empty() && recordings.size() <= kSensorsMax);
+  AxisBox box = kNoBox;
+  std::vector<std::vector<FrameOutcome>> outcomes;  // of each recording
+  for (const SensorRecording& recording : recordings) {
+    const DepthSensor sensor = offline_sensor(recording.depth, options.range_max_m);
+    const auto number = static_cast<int>(outcomes.size()) + 1;
+    widen(box, recording.depth, DepthRays(sensor), options.resolution_m, number, outcomes.emplace_back());
+  }
+  if (!box.low_m.allFinite())
+    return failure(Fault::kDataMalformed, "no frame can be used; the first: {}", outcomes.front().front().refused);
+  const Result<GridGeometry> geometry = fit_grid(box, options.resolution_m, options.planes);
   if (!geometry) return std::unexpected(geometry.error());
-  DatasetMap mapped{VoxelMap(*geometry, VoxelMap::Planes::kLogOddsOnly), {}, {}};
-  Inserter inserter(*geometry, sensor);
-  std::optional<PlaceWatch> watch;
-  if (options.place_m) watch.emplace(*options.place_m, options.resolution_m, sensor);
-  for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    const MappingFrame& frame = dataset.frames[i];
-    FrameOutcome& outcome = outcomes[i];
-    if (outcome.refused.empty()) {
-      const Result<LoadedFrame> loaded = load(frame, dataset);
-      if (!loaded) return std::unexpected(loaded.error());  // it was readable a moment ago
-      const DepthImage depth = loaded->image.view(dataset.units_per_m);
-      const Result<InsertionResult> result = inserter.insert(mapped.map, depth, frame.map_T_depth, {}, frame.stamp_s);
-      outcome.pixels_saturated = loaded->pixels_saturated;
-      if (result)
-        outcome.inserted = *result;
-      else
-        outcome.refused = reason_of(outcome, result.error());
-      if (watch && result) watch->see(depth, frame, mapped.place);
+  DatasetMap mapped{VoxelMap(*geometry, VoxelMap::Planes::kLogOddsOnly), MapPlanes(*geometry, options.planes), {}, {}};
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    RecordingMapper mapper(recordings[i], options, mapped);
+    for (std::size_t frame = 0; frame < outcomes[i].size(); ++frame) {
+      FrameOutcome& outcome = outcomes[i][frame];
+      if (outcome.refused.empty())
+        if (const Status status = mapper.map(frame, outcome); !status) return std::unexpected(status.error());
+      outcome.voxels = mapped.map.counts();
+      report(outcome);
     }
-    outcome.voxels = mapped.map.counts();
-    report(outcome);
+    add_refused_lines(recordings[i].depth, static_cast<int>(i) + 1, outcomes[i]);
+    for (FrameOutcome& outcome : outcomes[i]) {
+      if (outcome.voxels == VoxelCounts{})
+        outcome.voxels = mapped.frames.empty() ? VoxelCounts{mapped.map.size(), 0, 0} : mapped.frames.back().voxels;
+      mapped.frames.push_back(std::move(outcome));
+    }
   }
-  add_refused_lines(dataset, outcomes);
-  for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    if (outcomes[i].voxels == VoxelCounts{})
-      outcomes[i].voxels = i == 0 ? VoxelCounts{mapped.map.size(), 0, 0} : outcomes[i - 1].voxels;
-  }
-  mapped.frames = std::move(outcomes);
   return mapped;
 }
 

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "algorithms/mapping/octree_writer.hpp"
+#include "algorithms/mapping/ply_reader.hpp"
 
 namespace firstlook {
 namespace {
@@ -83,6 +84,12 @@ Result<MapInGrid> read_map_file_into(const std::filesystem::path& file, const Gr
   const Result<std::uint64_t> outside = fill(file, *depth, geometry, log_odds);
   if (!outside) return std::unexpected(outside.error());
   return MapInGrid{VoxelMap(geometry, std::move(log_odds)), *outside};
+}
+
+Result<MapPlanes> read_planes_beside(const std::filesystem::path& file, const GridGeometry& geometry) {
+  const std::filesystem::path ply = file.parent_path() / "map.ply";
+  if (!std::filesystem::is_regular_file(ply)) return MapPlanes{};
+  return with_file(ply, [&](ByteSource source) { return read_ply_planes(source, geometry); });
 }
 
 }  // namespace firstlook

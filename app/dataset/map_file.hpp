@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "algorithms/mapping/map_planes.hpp"
 #include "algorithms/mapping/octree_reader.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 
@@ -22,5 +23,9 @@ struct MapInGrid {
 /// Reads the part of a file that lies in a grid. The grid's voxels must be those of the file, or 2, 4, 8 .. of them.
 /// @return as above; kMapUnreadable with both resolutions, or both boxes when nothing of the file lies in the grid
 [[nodiscard]] Result<MapInGrid> read_map_file_into(const std::filesystem::path& file, const GridGeometry& geometry);
+
+/// The planes in the map.ply beside a stored map, as write_map_files leaves it; none where there is no such file, or
+/// one without planes. @return kMapUnreadable
+[[nodiscard]] Result<MapPlanes> read_planes_beside(const std::filesystem::path& file, const GridGeometry& geometry);
 
 }  // namespace firstlook

@@ -5,26 +5,18 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <span>
-#include <string_view>
 
 #include "app/dataset/calibration_dataset.hpp"
+#include "app/dataset/tum_lines.hpp"
 
 namespace firstlook {
 namespace {
 
 constexpr double kQuaternionTolerance = 1e-2;               // TUM's files round to four decimals
 constexpr double kDepthScaleMin = 1, kDepthScaleMax = 1e6;  // metres to micrometres
-
-// A line of a file that is neither empty nor a comment, cut at white space.
-struct Line {
-  int number = 0;
-  std::vector<std::string> words;
-};
 
 struct StampedPose {
   int line = 0;
@@ -34,38 +26,8 @@ struct StampedPose {
   std::string fault;  // not empty: at this time the camera was lost
 };
 
-Result<std::vector<Line>> read_lines(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream || std::filesystem::is_directory(file))
-    return failure(Fault::kDataMissing, "{}: no such file", file.string());
-  std::vector<Line> lines;
-  std::string text;
-  for (int number = 1; std::getline(stream, text); ++number) {
-    Line line{number, {}};
-    std::string_view rest = text;
-    while (true) {
-      const std::size_t from = rest.find_first_not_of(" \t\r");
-      if (from == std::string_view::npos) break;
-      rest.remove_prefix(from);
-      const std::size_t to = std::min(rest.find_first_of(" \t\r"), rest.size());
-      line.words.emplace_back(rest.substr(0, to));
-      rest.remove_prefix(to);
-    }
-    if (!line.words.empty() && line.words.front().front() != '#') lines.push_back(std::move(line));
-  }
-  return lines;
-}
-
-// A finite number and nothing else.
-std::optional<double> to_number(const std::string& word) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 // What is wrong with the numbers of a line, or nothing.
-std::string read_numbers(const Line& line, std::span<double> numbers) {
+std::string read_numbers(const TumLine& line, std::span<double> numbers) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const std::optional<double> number = to_number(line.words[i]);
     if (!number) return fmt::format("'{}' is not a finite number", line.words[i]);
@@ -74,7 +36,7 @@ std::string read_numbers(const Line& line, std::span<double> numbers) {
   return {};
 }
 
-StampedPose read_pose(const Line& line) {
+StampedPose read_pose(const TumLine& line) {
   StampedPose pose;
   pose.line = line.number;
   pose.stamp_s = to_number(line.words[0]).value_or(std::nan(""));
@@ -97,7 +59,7 @@ StampedPose read_pose(const Line& line) {
 
 // In the order of time, faults among them; those whose time is not known are only noted.
 Result<std::vector<StampedPose>> read_poses(const std::filesystem::path& file, MappingDataset& dataset) {
-  const Result<std::vector<Line>> lines = read_lines(file);
+  const Result<std::vector<TumLine>> lines = read_tum_lines(file);
   if (!lines) return std::unexpected(lines.error());
   std::vector<StampedPose> poses;
   const auto refuse = [&dataset](const StampedPose& pose, const std::string& reason) {
@@ -105,7 +67,7 @@ Result<std::vector<StampedPose>> read_poses(const std::filesystem::path& file, M
         {pose.line, pose.stamp_s, {}, fmt::format("groundtruth.txt:{}: {}", pose.line, reason)});
   };
   std::size_t good = 0;
-  for (const Line& line : *lines) {
+  for (const TumLine& line : *lines) {
     StampedPose pose = read_pose(line);
     if (!pose.fault.empty()) refuse(pose, pose.fault);
     good += pose.fault.empty() ? 1 : 0;
@@ -163,29 +125,7 @@ PoseOrReason pose_at(std::span<const StampedPose> poses, double stamp_s) {
   return std::unexpected(reason);
 }
 
-// A line of depth.txt as far as it can be read.
-struct FrameLine {
-  int number = 0;
-  double stamp_s = 0;
-  std::string image;
-  std::string fault;
-};
-
-FrameLine read_frame(const Line& line, const std::filesystem::path& folder) {
-  FrameLine frame{line.number, to_number(line.words[0]).value_or(std::nan("")), {}, {}};
-  if (line.words.size() > 1) frame.image = line.words[1];
-  if (line.words.size() != 2)
-    frame.fault = fmt::format("{} columns instead of 'timestamp filename'", line.words.size());
-  else if (!std::isfinite(frame.stamp_s))
-    frame.fault = fmt::format("'{}' is not a finite number", line.words[0]);
-  else if (frame.stamp_s < 0)
-    frame.fault = "negative time stamp";
-  else if (!std::filesystem::is_regular_file(folder / frame.image))
-    frame.fault = fmt::format("{}: no such file", frame.image);
-  return frame;
-}
-
-std::string order_fault(const FrameLine& frame, const MappingFrame& last) {
+std::string order_fault(const StampedImage& frame, const MappingFrame& last) {
   if (frame.stamp_s > last.stamp_s) return {};
   if (frame.stamp_s == last.stamp_s) return fmt::format("the stamp of line {} again", last.line);
   return fmt::format("time stamps must ascend, and line {} has {:.6f} s (--sort sorts them)", last.line, last.stamp_s);
@@ -193,23 +133,24 @@ std::string order_fault(const FrameLine& frame, const MappingFrame& last) {
 
 Status read_frames(const std::filesystem::path& folder, std::span<const StampedPose> poses, FrameOrder order,
                    MappingDataset& dataset) {
-  const Result<std::vector<Line>> lines = read_lines(folder / "depth.txt");
+  const Result<std::vector<TumLine>> lines = read_tum_lines(folder / "depth.txt");
   if (!lines) return std::unexpected(lines.error());
   if (lines->empty()) return failure(Fault::kDataMalformed, "depth.txt: no frames");
-  std::vector<FrameLine> frames;
-  for (const Line& line : *lines) frames.push_back(read_frame(line, folder));
+  std::vector<StampedImage> frames;
+  for (const TumLine& line : *lines) frames.push_back(read_stamped_image(line, folder));
   if (order == FrameOrder::kByStamp)
-    std::ranges::stable_sort(frames, {}, [](const FrameLine& f) { return std::isfinite(f.stamp_s) ? f.stamp_s : -1; });
-  for (FrameLine& frame : frames) {
+    std::ranges::stable_sort(frames, {},
+                             [](const StampedImage& f) { return std::isfinite(f.stamp_s) ? f.stamp_s : -1; });
+  for (StampedImage& frame : frames) {
     if (frame.fault.empty() && !dataset.frames.empty()) frame.fault = order_fault(frame, dataset.frames.back());
     const PoseOrReason pose = frame.fault.empty() ? pose_at(poses, frame.stamp_s) : std::unexpected(frame.fault);
     if (pose) {
-      dataset.frames.push_back({frame.number, frame.stamp_s, folder / frame.image, *pose});
+      dataset.frames.push_back({frame.line, frame.stamp_s, folder / frame.image, *pose});
       continue;
     }
     dataset.frames_without_pose += frame.fault.empty() ? 1 : 0;
     dataset.refused.push_back(
-        {frame.number, frame.stamp_s, frame.image, fmt::format("depth.txt:{}: {}", frame.number, pose.error())});
+        {frame.line, frame.stamp_s, frame.image, fmt::format("depth.txt:{}: {}", frame.line, pose.error())});
   }
   std::ranges::stable_sort(dataset.refused, {}, &RefusedLine::line);
   if (dataset.frames.empty())

@@ -74,6 +74,8 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
     case JobKind::kTouchTest:
       return run<TouchTestArguments>(request, result, failed_,
                                      [&b](const TouchTestArguments& a) { return b.touch_test(a); });
+    case JobKind::kColorLook:
+      return run<ColorArguments>(request, result, failed_, [&b](const ColorArguments& a) { return b.color_look(a); });
     case JobKind::kSummarize:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.summarize(); });
     case JobKind::kForgetKnownFree:
@@ -111,6 +113,7 @@ Duration virtual_duration(JobKind kind) {
       return milliseconds(50);
     case JobKind::kIntegrate:
     case JobKind::kForgetKnownFree:
+    case JobKind::kColorLook:
       return milliseconds(80);
     case JobKind::kNextSweepView:
       return milliseconds(100);

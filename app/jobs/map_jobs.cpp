@@ -10,7 +10,10 @@
 namespace firstlook {
 namespace {
 
-constexpr double kPoseRange_m = 1.5;  // where the uncertainty of a pose is asked for, as in the clearance of rule 5
+constexpr double kPoseRange_m = 1.5;      // where the uncertainty of a pose is asked for, as in the clearance of rule 5
+constexpr std::uint8_t kDepthSensor = 1;  // of the plane "sensor": there is one
+// The arm stands: joints at the colour frame and at the depth frame differ by less, half a pixel 1.5 m ahead.
+constexpr double kStanding_rad = 5e-4;
 
 }  // namespace
 
@@ -50,6 +53,7 @@ std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
   if (camera.width != sensor.intrinsics.width || camera.height != sensor.intrinsics.height)
     return FrameFlaw::kWrongSize;
   const ImageView<std::uint16_t> pixels{depth_pixels_.items().data(), camera.width, camera.height};
+  inserted_.reset();
   if (!depth_.read(posed.frame, pixels)) return FrameFlaw::kUnreadable;
   const LinkFrames frames = forward(arm_, posed.at_rad);
   const auto base_T_depth = frames.flange() * hand_eye_->flange_T_camera * camera_T_depth();
@@ -72,6 +76,8 @@ std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
   }
   // What is left to refuse is a pose farther away than any arm reaches.
   if (!inserter_.insert(map_, depth, base_T_depth, self_depth_.items(), stamp_s)) return FrameFlaw::kBadPose;
+  if (planes_.sensor) planes_.sensor->note(inserter_.missed(), inserter_.hit(), kDepthSensor);
+  inserted_ = {posed.frame.sequence, base_T_depth, units_per_m};
   if (fine_map_ && !fine_inserter_->insert(*fine_map_, depth, base_T_depth, self_depth_.items(), stamp_s))
     return FrameFlaw::kBadPose;
   if (open_rays_) {
@@ -81,6 +87,24 @@ std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
     holes_record_.voxels_cleared += open.voxels_cleared;
   }
   return std::nullopt;
+}
+
+/// Each camera is where the arm was at its own frame.
+ColorResult Workbench::color_look(const ColorArguments& arguments) {
+  ColorResult result;
+  const bool stands = (arguments.color.at_rad - arguments.depth.at_rad).max_abs() < kStanding_rad;
+  if (!color_registration_ || !inserted_ || inserted_->sequence != arguments.depth.frame.sequence || !stands)
+    return result;
+  const CameraIntrinsics& depth = inserter_.sensor().intrinsics;
+  const ImageView<Rgb> colors{colors_.items().data(), color_.intrinsics().width, color_.intrinsics().height};
+  if (!color_.read_color(arguments.color.frame, colors)) return result;
+  const auto base_T_camera = forward(arm_, arguments.color.at_rad).flange() * hand_eye_->flange_T_camera;
+  result.points = color_registration_->add(
+      *planes_.color, {{depth_pixels_.items().data(), depth.width, depth.height}, inserted_->units_per_m},
+      inserted_->base_T_depth, self_depth_.items(), {camera(), base_T_camera.inverse() * inserted_->base_T_depth},
+      {colors.data, colors.width, colors.height}, inserter_.hit());
+  ++looks_colored_;
+  return result;
 }
 
 double Workbench::pose_sigma_m(const PosedFrame& posed, const LinkFrames& frames) const {

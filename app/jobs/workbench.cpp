@@ -27,6 +27,10 @@ VoxelMap::Planes planes_of(const Config& config) {
   return config.map.holes == "ignore" ? VoxelMap::Planes::kAll : VoxelMap::Planes::kWithOpenRays;
 }
 
+PlaneChoice map_planes_of(const Config& config) {
+  return planes_from_words(config.map.planes).value_or(PlaneChoice{});  // load_config has refused other words
+}
+
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 GridGeometry fine_geometry(const Config& config) {
@@ -81,13 +85,18 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
       GridGeometry::covering(vector_of(config.map.low_m), vector_of(config.map.high_m), config.map.resolution_m);
   const bool has_prior = config.map.prior != "none";
   const std::size_t needed = VoxelMap::required_bytes(geometry, planes_of(config)) + 3 * geometry.count() +
-                             fine_map_bytes(config) + (has_prior ? prior_bytes(geometry) : 0);
+                             fine_map_bytes(config) + MapPlanes::required_bytes(geometry, map_planes_of(config)) +
+                             (has_prior ? prior_bytes(geometry) : 0);
   if (needed > memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) {
-    return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m{} need {:.1f} MiB, the budget holds {:.1f} MiB",
+    return failure(Fault::kMapTooLarge, "{} x {} x {} voxels of {} m{}{} need {:.1f} MiB, the budget holds {:.1f} MiB",
                    geometry.size.x(), geometry.size.y(), geometry.size.z(), geometry.resolution_m,
+                   map_planes_of(config).any() ? " with map.planes" : "",
                    fine_map_bytes(config) > 0 ? " and the finer map" : "", static_cast<double>(needed) / memory::kMiB,
                    static_cast<double>(memory::budget_row(memory::Pool::kVoxelPlanes).bytes()) / memory::kMiB);
   }
+  if (map_planes_of(config).color && !color.delivers_color())
+    return failure(Fault::kConfigBadValue, "map.planes: {}: the colour camera delivers grey values only",
+                   config.map.planes);
   std::optional<VoxelMap> prior;
   if (has_prior) {
     auto read = read_map_file_into(config.map.prior, geometry);
@@ -161,6 +170,8 @@ void Workbench::take_options() {
     inserter_.set_ground(ground);
     map_.block(HalfSpace{-Eigen::Vector3d::UnitZ(), -ground.top_m()});
   }
+  planes_ = MapPlanes(g, map_planes_of(config_));
+  if (planes_.color) color_registration_.emplace(g, sensor, color_.intrinsics());
   if (config_.map.fine_resolution_m == 0) return;
   fine_map_.emplace(fine_geometry(config_), VoxelMap::Planes::kLogOddsOnly);
   fine_inserter_.emplace(fine_map_->geometry(), sensor);
@@ -179,6 +190,7 @@ Status Workbench::take_memory() {
   const std::size_t options = (open_rays_ ? OpenRays::required_bytes(g, sensor) : 0) +
                               (filter_ ? DepthFilter::required_bytes(g, sensor, filter_of(config_)) : 0) +
                               PlaneFit::required_bytes(sensor.intrinsics, plane_fit_of(config_)) +
+                              (planes_.color ? ColorRegistration::required_bytes(sensor, color_.intrinsics()) : 0) +
                               (fine_map_ ? Inserter::required_bytes(fine_map_->geometry(), sensor) : 0);
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
   const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
@@ -193,8 +205,9 @@ Status Workbench::take_memory() {
   const std::size_t way_sight =
       sizeof(WaySight) + decltype(WayArguments::joints)::capacity() * sizeof(JointSample) + points_max;
   for (const auto& [pool, bytes] : {
-           std::pair{memory::Pool::kVoxelPlanes, VoxelMap::required_bytes(g, planes_of(config_)) + 3 * g.count() +
-                                                     fine_map_bytes(config_) + (prior_ ? prior_bytes(g) : 0)},
+           std::pair{memory::Pool::kVoxelPlanes,
+                     VoxelMap::required_bytes(g, planes_of(config_)) + 3 * g.count() + fine_map_bytes(config_) +
+                         MapPlanes::required_bytes(g, planes_.choice()) + (prior_ ? prior_bytes(g) : 0)},
            std::pair{memory::Pool::kDistanceField,
                      2 * DistanceField::required_bytes(g) + Inserter::required_bytes(g, sensor) + options},
            std::pair{memory::Pool::kGuardianSnapshot, 2 * snapshot},
@@ -214,6 +227,11 @@ Status Workbench::take_memory() {
   auto gray = memory::PoolBuffer<std::uint8_t>::make(memory::Pool::kColorFrames, color_pixels);
   if (!gray) return std::unexpected(gray.error());
   gray_ = std::move(*gray);
+  if (planes_.color) {
+    auto colors = memory::PoolBuffer<Rgb>::make(memory::Pool::kColorFrames, color_pixels);
+    if (!colors) return std::unexpected(colors.error());
+    colors_ = std::move(*colors);
+  }
   auto raw = memory::PoolBuffer<std::uint16_t>::make(memory::Pool::kDepthFrames, depth_pixels);
   if (!raw) return std::unexpected(raw.error());
   depth_pixels_ = std::move(*raw);

@@ -11,6 +11,7 @@
 #include "algorithms/calibration/view_design.hpp"
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/kinematics/speed.hpp"
+#include "algorithms/mapping/color_registration.hpp"
 #include "algorithms/mapping/depth_filter.hpp"
 #include "algorithms/mapping/distance_field.hpp"
 #include "algorithms/mapping/frame_gate.hpp"
@@ -112,6 +113,7 @@ class Workbench {
   [[nodiscard]] VerificationViewResult next_verification_view(const FromHere& here);
   [[nodiscard]] VerifyResult verify_calibration();
   [[nodiscard]] IntegrateResult integrate(const IntegrateArguments& arguments);
+  [[nodiscard]] ColorResult color_look(const ColorArguments& arguments);
   [[nodiscard]] NextViewResult next_sweep_view(const FromHere& here);
   [[nodiscard]] NextViewResult next_view(const FromHere& here);
   [[nodiscard]] CheckBoardResult check_board(const DetectArguments& arguments);
@@ -133,6 +135,13 @@ class Workbench {
   [[nodiscard]] const CellFacts& facts() const { return facts_; }
   [[nodiscard]] const std::vector<RemainingRecord>& remaining() const { return remaining_; }
   [[nodiscard]] const VoxelMap& map() const { return map_; }
+  /// With map.planes.
+  [[nodiscard]] const MapPlanes& planes() const { return planes_; }
+  /// After the last job. @param objects  of map()
+  void label_objects(const MapObjects& objects) {
+    if (planes_.label) planes_.label->write(objects);
+  }
+  [[nodiscard]] std::uint64_t looks_colored() const { return looks_colored_; }
   /// Of a part of the cell (map.fine_resolution_m); nothing moves by it. Null when there is none.
   [[nodiscard]] const VoxelMap* fine_map() const { return fine_map_ ? &*fine_map_ : nullptr; }
   [[nodiscard]] bool swept() const { return !sweeping_; }
@@ -317,6 +326,17 @@ class Workbench {
   std::optional<PlaneFit> plane_fit_;  ///< with depth.plane_fit_px
   std::optional<VoxelMap> fine_map_;   ///< with map.fine_resolution_m
   std::optional<Inserter> fine_inserter_;
+  MapPlanes planes_;                                     ///< with map.planes
+  std::optional<ColorRegistration> color_registration_;  ///< with colours
+  memory::PoolBuffer<Rgb> colors_;                       ///< with colours: a picture
+  std::uint64_t looks_colored_ = 0;
+  /// The frame that went into the map last, as it did; its pixels are in depth_pixels_ and self_depth_.
+  struct InsertedFrame {
+    std::uint32_t sequence = 0;
+    Transform<Base, Depth> base_T_depth;
+    double units_per_m = 1000;
+  };
+  std::optional<InsertedFrame> inserted_;
   DistanceField field_;
   std::vector<std::uint8_t> free_mask_;
   std::vector<std::uint8_t> zone_;

@@ -32,8 +32,9 @@ enum class JobKind : std::uint16_t {
   kVerifyCalibration,
   kSeeOnTheWay,
   kTouchTest,
+  kColorLook,
 };
-inline constexpr JobKind kLastJobKind = JobKind::kTouchTest;
+inline constexpr JobKind kLastJobKind = JobKind::kColorLook;
 
 /// What people read: "choosing the next view".
 [[nodiscard]] constexpr std::string_view name_of(JobKind kind) {
@@ -55,7 +56,8 @@ inline constexpr JobKind kLastJobKind = JobKind::kTouchTest;
       "choosing the next view to test the calibration from",
       "testing the stored calibration",
       "looking at the board on the way",
-      "comparing touches with the calibration"};
+      "comparing touches with the calibration",
+      "taking the colours of a look"};
   return kNames[static_cast<std::size_t>(kind) - 1];
 }
 
@@ -357,6 +359,24 @@ struct IntegrateResult {
   template <typename Archive>
   void fields(Archive& a) {
     a(used, path_free, unknown, free, occupied, gained, at_view, frozen);
+  }
+};
+
+/// kColorLook: the colours of a depth frame that was integrated just before.
+struct ColorArguments {
+  PosedFrame color;
+  PosedFrame depth;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(color, depth);
+  }
+};
+
+struct ColorResult {
+  std::uint32_t points = 0;  ///< that gave their voxels a colour
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(points);
   }
 };
 

@@ -409,6 +409,7 @@ void Machine::open_look(double wait_s) {
   look_unposed_ = false;
   look_.clear();
   depth_beside_.clear();
+  color_beside_.reset();
   set_timer(MachineTimer::kSettle, wait_s);
 }
 
@@ -436,6 +437,8 @@ bool Machine::advance_look(const MachineEvent& event) {
     const bool wanted = settings_.depth_beside && !depth_beside_.full() && depth->frame.frame.stamp >= look_from_;
     if (wanted) depth_beside_.push_back(depth->frame);
   }
+  if (const auto* color = std::get_if<ColorPosed>(&event); color && look_depth_ && settings_.color_at_looks)
+    color_beside_ = color->frame;
   if (posed == nullptr || !look_open_ || posed->frame.stamp < look_from_) return false;
   look_.push_back(*posed);
   if (look_.size() < look_count_) return false;
@@ -448,6 +451,8 @@ void Machine::integrate(const PosedFrame& frame, bool at_view) {
   const std::uint32_t awaited = awaited_;
   integrate_job_ = start_job(JobKind::kIntegrate,
                              IntegrateArguments{frame, now_.seconds(), at_view, arm_.position_rad, legs_ahead()});
+  if (at_view && color_beside_) start_job(JobKind::kColorLook, ColorArguments{*color_beside_, frame});
+  color_beside_.reset();
   awaited_ = awaited;
 }
 

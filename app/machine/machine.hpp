@@ -25,9 +25,10 @@ struct MachineSettings {
   int targets = 1;  ///< that are looked for
   int calibration_views_min = 8;
   int calibration_views_max = 30;
-  int verify_views = 3;        ///< views of the board that a stored calibration is tested on at least
-  bool depth_beside = true;    ///< depth frames beside the colour frames of calibration views
-  bool see_on_the_way = true;  ///< frames between calibration views, for the offsets of the stamps
+  int verify_views = 3;         ///< views of the board that a stored calibration is tested on at least
+  bool depth_beside = true;     ///< depth frames beside the colour frames of calibration views
+  bool color_at_looks = false;  ///< colour frames beside the depth frames of looks, for the colours of the map
+  bool see_on_the_way = true;   ///< frames between calibration views, for the offsets of the stamps
   int explore_views_max = 60;
   double frames_while_moving_hz = 2;
   FixedVector<std::int32_t, kTouchPointsMax> touch_points;  ///< of the board, for the touch test; empty: none
@@ -161,7 +162,8 @@ class Machine {
   /// From now on frames are taken for that much later (or earlier) than their stamps say.
   void correct_stamps(const StampOffsets& offsets);
 
-  /// Starts an integration of a depth frame; its result comes to whoever is in charge then.
+  /// Starts an integration of a depth frame; its result comes to whoever is in charge then. Of a look with a colour
+  /// frame beside it the map takes its colours, and nobody waits for that.
   void integrate(const PosedFrame& frame, bool at_view);
   [[nodiscard]] bool integrating() const { return integrate_job_ != 0; }
   [[nodiscard]] std::optional<IntegrateResult> integrate_result(const MachineEvent& event);
@@ -235,6 +237,7 @@ class Machine {
   Instant look_from_{};
   FixedVector<PosedFrame, 8> look_;
   FixedVector<PosedFrame, kDepthBesideMax> depth_beside_;
+  std::optional<PosedFrame> color_beside_;  ///< the latest of a look at depth
 };
 
 }  // namespace firstlook

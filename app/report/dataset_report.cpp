@@ -7,7 +7,7 @@
 
 #include "algorithms/vision/camera_model.hpp"
 #include "algorithms/vision/target_names.hpp"
-#include "app/dataset/gray_image_file.hpp"
+#include "app/dataset/picture_file.hpp"
 #include "app/report/html.hpp"
 #include "app/report/sections.hpp"
 

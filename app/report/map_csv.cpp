@@ -6,15 +6,43 @@
 
 namespace firstlook {
 
-void write_voxels_csv(const VoxelMap& map, ByteSink sink) {
+namespace {
+
+std::string plane_columns(const MapPlanes& planes) {
+  return fmt::format("{}{}{}", planes.color ? ",red,green,blue" : "", planes.label ? ",object,shape" : "",
+                     planes.sensor ? ",sensor" : "");
+}
+
+/// Colours and labels are of surfaces: of what is occupied.
+std::string plane_cells(const MapPlanes& planes, std::size_t index, bool occupied) {
+  std::string cells;
+  if (planes.color) {
+    const std::optional<Rgb> c = occupied ? planes.color->at(index) : std::nullopt;
+    cells += c ? fmt::format(",{},{},{}", (*c)[0], (*c)[1], (*c)[2]) : ",,,";
+  }
+  if (planes.label) {
+    const VoxelLabel label = planes.label->at(index);
+    cells += label.object != 0 ? fmt::format(",{},{}", label.object, to_string(label.shape)) : ",,";
+  }
+  if (planes.sensor) {
+    const int sensor = planes.sensor->at(index);
+    cells += sensor != 0 ? fmt::format(",{}", sensor) : ",";
+  }
+  return cells;
+}
+
+}  // namespace
+
+void write_voxels_csv(const VoxelMap& map, ByteSink sink, const MapPlanes& planes) {
   const auto write = [&sink](std::string_view text) { sink(std::as_bytes(std::span(text))); };
-  write("x_m,y_m,z_m,class,log_odds\n");
+  write(fmt::format("x_m,y_m,z_m,class,log_odds{}\n", plane_columns(planes)));
   for (std::size_t i = 0; i < map.size(); ++i) {
     const VoxelClass voxel_class = map.voxel_class(i);
     if (voxel_class == VoxelClass::kUnknown) continue;
     const Eigen::Vector3d c = map.geometry().center_m(map.geometry().voxel_at(i));
-    write(fmt::format("{:.6g},{:.6g},{:.6g},{},{:.4f}\n", c.x(), c.y(), c.z(),
-                      voxel_class == VoxelClass::kFree ? "free" : "occupied", map.log_odds(i) * kLogOddsUnit));
+    const bool occupied = voxel_class == VoxelClass::kOccupied;
+    write(fmt::format("{:.6g},{:.6g},{:.6g},{},{:.4f}{}\n", c.x(), c.y(), c.z(), occupied ? "occupied" : "free",
+                      map.log_odds(i) * kLogOddsUnit, plane_cells(planes, i, occupied)));
   }
 }
 

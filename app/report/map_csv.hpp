@@ -5,13 +5,15 @@
 #include <string>
 
 #include "algorithms/mapping/byte_sink.hpp"
+#include "algorithms/mapping/map_planes.hpp"
 #include "algorithms/mapping/objects.hpp"
 #include "app/dataset/hand_eye_file.hpp"
 
 namespace firstlook {
 
-/// A row for each known voxel: centre, class (free, occupied), log-odds as OctoMap has them.
-void write_voxels_csv(const VoxelMap& map, ByteSink sink);
+/// A row for each known voxel: centre, class (free, occupied), log-odds as OctoMap has them; of the planes that there
+/// are red, green and blue, object and shape, sensor, each empty where nothing is known.
+void write_voxels_csv(const VoxelMap& map, ByteSink sink, const MapPlanes& planes = {});
 
 /// A row for each box: its corners.
 [[nodiscard]] std::string boxes_csv(std::span<const AxisBox> boxes);

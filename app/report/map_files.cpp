@@ -19,14 +19,15 @@ Status write_streamed(const std::string& path, FunctionRef<void(ByteSink)> write
   return file->commit();
 }
 
-Status write_map_files(const std::string& folder, const VoxelMap& map, int depth) {
+Status write_map_files(const std::string& folder, const VoxelMap& map, int depth, const MapPlanes& planes) {
   Status status = make_directories(folder);
   const auto add = [&](std::string_view name, FunctionRef<void(ByteSink)> write) {
     if (status) status = write_streamed(fmt::format("{}/{}", folder, name), write);
   };
   add("collision_map.bt", [&](ByteSink sink) { write_bt(map, collision_class, depth, sink); });
   add("map.ot", [&](ByteSink sink) { write_ot(map, depth, sink); });
-  add("map.ply", [&](ByteSink sink) { write_ply(map, false, sink); });
+  if (planes.color) add("color_map.ot", [&](ByteSink sink) { write_color_ot(map, *planes.color, depth, sink); });
+  add("map.ply", [&](ByteSink sink) { write_ply(map, false, sink, planes); });
   return status;
 }
 

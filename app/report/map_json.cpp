@@ -72,11 +72,30 @@ Json frame_json(const FrameOutcome& frame) {
           {"voxels", counts_json(frame.voxels)}};
 }
 
-PlaceKnown look_up(const VoxelMap& map, const Eigen::Vector3d& point_m, const MapObjects* objects) {
+Json planes_json(const PlaneCounts& counts) {
+  Json planes = Json::object();
+  if (counts.planes.color) planes["color"] = {{"voxels", counts.colored}, {"of_occupied", counts.occupied}};
+  if (counts.planes.label) planes["label"] = {{"voxels", counts.labelled}};
+  if (counts.planes.sensor) planes["sensor"] = {{"voxels", counts.seen_last_by}};
+  return planes;
+}
+
+std::string planes_text(const PlaneCounts& counts) {
+  std::string text;
+  if (counts.planes.color) text += fmt::format("{} of the occupied voxels have a colour\n", counts.colored);
+  if (counts.planes.label) text += fmt::format("{} voxels belong to an object\n", counts.labelled);
+  for (std::size_t i = 0; i < counts.seen_last_by.size(); ++i)
+    text += fmt::format("{} voxels were seen last by sensor {}\n", counts.seen_last_by[i], i + 1);
+  return text;
+}
+
+PlaceKnown look_up(const VoxelMap& map, const Eigen::Vector3d& point_m, const MapObjects* objects,
+                   const MapPlanes& planes) {
   PlaceKnown place;
   place.point_m = point_m;
   place.voxel_class = map.class_at(point_m);
   place.nearest = nearest_occupied(map, point_m, collision_class);
+  place.planes = planes.choice();
   const GridGeometry& g = map.geometry();
   const Eigen::Vector3d low_m = g.first.cast<double>() * g.resolution_m;
   const Eigen::Vector3d high_m = (g.first + g.size).cast<double>() * g.resolution_m;
@@ -87,6 +106,9 @@ PlaceKnown look_up(const VoxelMap& map, const Eigen::Vector3d& point_m, const Ma
   const std::size_t index = g.index(voxel);
   if (map.log_odds(index) != kUnknownLogOdds) place.log_odds = map.log_odds(index) * kLogOddsUnit;
   if (objects != nullptr && objects->id_of[index] != 0) place.object = static_cast<int>(objects->id_of[index]);
+  if (planes.color && place.voxel_class == VoxelClass::kOccupied) place.color = planes.color->at(index);
+  if (planes.label && planes.label->at(index).object != 0) place.shape = planes.label->at(index).shape;
+  if (planes.sensor && planes.sensor->at(index) != 0) place.sensor = planes.sensor->at(index);
   return place;
 }
 
@@ -99,13 +121,17 @@ Json place_json(const PlaceKnown& place) {
             {"frames_hit", place.seen->frames_hit},
             {"last_seen_s", or_null(place.seen->last_seen_s)},
             {"last_hit_s", or_null(place.seen->last_hit_s)}};
-  return {{"point_m", vector_json(place.point_m)},
-          {"inside_map", place.inside},
-          {"class", name_of(place.voxel_class)},
-          {"log_odds", or_null(place.log_odds)},
-          {"seen", seen},
-          {"nearest_occupied", nearest},
-          {"object", or_null(place.object)}};
+  Json json = {{"point_m", vector_json(place.point_m)},
+               {"inside_map", place.inside},
+               {"class", name_of(place.voxel_class)},
+               {"log_odds", or_null(place.log_odds)},
+               {"seen", seen},
+               {"nearest_occupied", nearest},
+               {"object", or_null(place.object)}};
+  if (place.planes.color) json["color"] = or_null(place.color);
+  if (place.planes.label) json["shape"] = place.shape ? Json(to_string(*place.shape)) : Json(nullptr);
+  if (place.planes.sensor) json["sensor"] = or_null(place.sensor);
+  return json;
 }
 
 std::string place_text(const PlaceKnown& place) {
@@ -130,7 +156,16 @@ std::string place_text(const PlaceKnown& place) {
   } else {
     text += "  no voxel of the map is occupied\n";
   }
-  if (place.object) text += fmt::format("  it belongs to object {}\n", *place.object);
+  if (place.object)
+    text += fmt::format("  it belongs to object {}{}{}\n", *place.object, place.shape ? ", shape " : "",
+                        place.shape ? to_string(*place.shape) : "");
+  if (place.color) {
+    const Rgb& c = *place.color;
+    text += fmt::format("  its colour is red {}, green {}, blue {}\n", c[0], c[1], c[2]);
+  } else if (place.planes.color && place.voxel_class == VoxelClass::kOccupied) {
+    text += "  the colour camera did not see it\n";
+  }
+  if (place.sensor) text += fmt::format("  sensor {} saw it last\n", *place.sensor);
   return text;
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "algorithms/mapping/map_change.hpp"
+#include "algorithms/mapping/map_planes.hpp"
 #include "algorithms/mapping/objects.hpp"
 #include "app/dataset/dataset_mapping.hpp"
 
@@ -17,6 +18,11 @@ namespace firstlook {
 
 /// For each object id, shape, bounds_room, voxels and box {center_m, size_m, quaternion_xyzw}, in base (the map).
 [[nodiscard]] nlohmann::ordered_json objects_json(const MapObjects& objects);
+
+/// A key for each plane that there is.
+[[nodiscard]] nlohmann::ordered_json planes_json(const PlaneCounts& counts);
+/// The same in words, a line for each plane.
+[[nodiscard]] std::string planes_text(const PlaneCounts& counts);
 
 [[nodiscard]] nlohmann::ordered_json change_json(const MapChange& change);
 
@@ -32,8 +38,13 @@ struct PlaceKnown {
   std::optional<PlaceSeen> seen;   ///< empty: a stored map does not say
   std::optional<NearestOccupied> nearest;
   std::optional<int> object;  ///< whose voxel it is
+  PlaneChoice planes;         ///< that the map has; what follows is theirs
+  std::optional<Rgb> color;
+  std::optional<ObjectShape> shape;  ///< of the object
+  std::optional<int> sensor;         ///< that saw it last
 };
-[[nodiscard]] PlaceKnown look_up(const VoxelMap& map, const Eigen::Vector3d& point_m, const MapObjects* objects);
+[[nodiscard]] PlaceKnown look_up(const VoxelMap& map, const Eigen::Vector3d& point_m, const MapObjects* objects,
+                                 const MapPlanes& planes = {});
 [[nodiscard]] nlohmann::ordered_json place_json(const PlaceKnown& place);
 /// The same in words, a line for each fact.
 [[nodiscard]] std::string place_text(const PlaceKnown& place);

@@ -131,6 +131,22 @@ std::string refused_text(const MappingRecord& m) {
   return text;
 }
 
+/// What is kept for each voxel besides, a sentence for each plane.
+std::string planes_hint(const PlanesRecord& record) {
+  const PlaneCounts& c = record.counts;
+  std::string text;
+  if (c.planes.color) {
+    text += fmt::format(
+        " {} of {} occupied voxels have a colour, from {} looks: <code>map.ply</code>, <code>color_map.ot</code>; grey "
+        "in the pictures is what the colour camera did not see.",
+        grouped(c.colored), grouped(c.occupied), grouped(record.looks_colored));
+  }
+  if (c.planes.label) text += fmt::format(" {} voxels have the label of their object.", grouped(c.labelled));
+  for (std::size_t i = 0; i < c.seen_last_by.size(); ++i)
+    text += fmt::format(" {} voxels were seen last by sensor {}.", grouped(c.seen_last_by[i]), i + 1);
+  return fmt::format("<p class=\"hint\">Kept for each voxel:{}</p>\n", text);
+}
+
 }  // namespace
 
 std::string map_section(const RunRecord& record) {
@@ -162,6 +178,7 @@ std::string map_section(const RunRecord& record) {
     body += fmt::format("<p class=\"hint\">{} returns were moved onto the plane of their neighbours.</p>\n",
                         grouped(m.pixels_fitted));
   }
+  if (m.planes) body += planes_hint(*m.planes);
   if (m.fine) {
     body += fmt::format(
         "<p class=\"hint\">Finer map of a part, <code>fine_map.bt</code>, voxels of {:.0f} mm: {} free, {} occupied, "

@@ -48,25 +48,42 @@ Color object_color(const MapObject& object) {
   return kColors[static_cast<std::size_t>(object.id) % std::size(kColors)];
 }
 
-MapPicture object_picture(const VoxelMap& map, const MapObjects& objects, double azimuth_rad, std::string caption) {
+MapPicture empty_map_picture(std::string caption, std::string group) {
   MapPicture p;
   p.picture.caption = std::move(caption);
   p.picture.width = kWidth;
   p.picture.height = kHeight;
   p.picture.pixels.resize(static_cast<std::size_t>(kWidth) * kHeight * 3);
-  p.group = "Objects";
-  const GridGeometry& g = map.geometry();
-  const auto viewpoint =
-      Viewpoint::seeing(g.first.cast<double>() * g.resolution_m, (g.first + g.size).cast<double>() * g.resolution_m,
-                        azimuth_rad, kElevation_rad, kWidth, kHeight, kBorder_px);
+  p.group = std::move(group);
+  return p;
+}
+
+Viewpoint viewpoint_of(const GridGeometry& g, const RgbPicture& picture, double azimuth_rad) {
+  return Viewpoint::seeing(g.first.cast<double>() * g.resolution_m, (g.first + g.size).cast<double>() * g.resolution_m,
+                           azimuth_rad, kElevation_rad, picture.width, picture.height, kBorder_px);
+}
+
+std::vector<bool> walls_from_behind(const MapObjects& objects, const MapProjection& projection) {
+  std::vector<bool> hidden = {false};
+  for (const MapObject& object : objects.objects)
+    hidden.push_back(object.bounds_room && inward(object, objects).dot(projection.into()) > 0);
+  return hidden;
+}
+
+MapPicture object_picture(const VoxelMap& map, const MapObjects& objects, double azimuth_rad, std::string caption) {
+  MapPicture p = empty_map_picture(std::move(caption), "Objects");
+  const Viewpoint viewpoint = viewpoint_of(map.geometry(), p.picture, azimuth_rad);
   const MapProjection projection(viewpoint, kWidth, kHeight);
-  std::vector<std::optional<Color>> color_of = {kSpeck};
+  const std::vector<bool> hidden = walls_from_behind(objects, projection);
+  std::vector<Color> color_of = {kSpeck};
   for (const MapObject& object : objects.objects) {
-    const bool from_behind = object.bounds_room && inward(object, objects).dot(projection.into()) > 0;
-    color_of.push_back(from_behind ? std::nullopt : std::optional(object_color(object)));
+    color_of.push_back(object_color(object));
     if (!object.bounds_room) outline(object, projection, p);
   }
-  const auto color = [&](std::size_t index) { return color_of[objects.id_of[index]]; };
+  const auto color = [&](std::size_t index) {
+    const std::uint32_t id = objects.id_of[index];
+    return hidden[id] ? std::nullopt : std::optional(color_of[id]);
+  };
   draw_map(map, viewpoint, {}, color, {p.picture.pixels.data(), kWidth, kHeight});
   return p;
 }

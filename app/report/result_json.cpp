@@ -37,6 +37,11 @@ Json mapping_json(const MappingRecord& mapping) {
   for (std::size_t i = 0; i < kFrameFlaws; ++i) {
     refused[std::string(to_string(static_cast<FrameFlaw>(i)))] = mapping.frames_refused[i];
   }
+  Json planes = nullptr;
+  if (mapping.planes) {
+    planes = planes_json(mapping.planes->counts);
+    if (mapping.planes->counts.planes.color) planes["color"]["looks"] = mapping.planes->looks_colored;
+  }
   return {{"views", mapping.views.size()},
           {"resolution_m", mapping.resolution_m},
           {"voxels", counts_json(mapping.voxels)},
@@ -48,6 +53,7 @@ Json mapping_json(const MappingRecord& mapping) {
             {"infinite_pixels", mapping.infinite_pixels},
             {"pixels_left_out", mapping.pixels_left_out},
             {"pixels_fitted", mapping.pixels_fitted}}},
+          {"planes", planes},
           {"fine", mapping.fine ? Json{{"resolution_m", mapping.fine->resolution_m},
                                        {"voxels", counts_json(mapping.fine->voxels)}}
                                 : Json(nullptr)},

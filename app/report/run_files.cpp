@@ -48,6 +48,7 @@ std::vector<NamedFile> files_of_map(const MapFiles& map) {
   if (!map.fine_map_bt.empty()) files.push_back({"fine_map.bt", map.fine_map_bt});
   if (!map.collision_map_bt.empty()) files.push_back({"collision_map.bt", map.collision_map_bt});
   if (!map.map_ot.empty()) files.push_back({"map.ot", map.map_ot});
+  if (!map.color_map_ot.empty()) files.push_back({"color_map.ot", map.color_map_ot});
   if (!map.map_ply.empty()) files.push_back({"map.ply", map.map_ply});
   if (map.occupied.empty()) return files;
   for (NamedFile& file : ros_scene_files(map.occupied)) files.push_back({"ros/" + file.name, std::move(file.text)});

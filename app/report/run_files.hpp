@@ -15,6 +15,7 @@ struct MapFiles {
   std::string collision_map_bt;
   std::string map_ot;
   std::string map_ply;
+  std::string color_map_ot;
   std::string fine_map_bt;
   std::vector<AxisBox> occupied;  ///< merge_occupied of the map, base frame: becomes ros/*.scene, once for each frame
 };

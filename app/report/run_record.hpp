@@ -17,6 +17,7 @@
 #include "algorithms/calibration/verification.hpp"
 #include "algorithms/mapping/frame_gate.hpp"
 #include "algorithms/mapping/map_change.hpp"
+#include "algorithms/mapping/map_planes.hpp"
 #include "algorithms/mapping/objects.hpp"
 #include "algorithms/mapping/voxel_map.hpp"
 #include "algorithms/motion/clearance.hpp"
@@ -142,12 +143,19 @@ struct FineMapRecord {
   VoxelCounts voxels;
 };
 
+/// What is kept for each voxel besides (map.planes).
+struct PlanesRecord {
+  PlaneCounts counts;               ///< of the whole grid
+  std::uint64_t looks_colored = 0;  ///< looks whose colour frames gave colours
+};
+
 /// Null in result.json when nothing was mapped.
 struct MappingRecord {
   double resolution_m = 0;
   std::vector<MappingViewRecord> views;
   VoxelCounts voxels;       ///< of the reach zone at the end, as in the last of `views`
   VoxelCounts grid_voxels;  ///< of the whole grid: what the map files hold
+  std::optional<PlanesRecord> planes;
   std::optional<FineMapRecord> fine;
   std::vector<RemainingRecord> remaining;
   std::optional<MapChange> since_prior;  ///< in the reach zone; empty when no earlier map was given

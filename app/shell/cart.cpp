@@ -9,6 +9,7 @@
 #include "algorithms/mapping/ply_writer.hpp"
 #include "app/cli/small_commands.hpp"
 #include "app/config/load_config.hpp"
+#include "app/report/color_picture.hpp"
 #include "app/report/done_text.hpp"
 #include "app/report/object_picture.hpp"
 #include "app/shell/event_codec.hpp"
@@ -54,6 +55,11 @@ std::string reason_text(const RunRecord& record, const Ending& ending) {
   const FaultRow& row = fault_row(ending.fault);
   const std::string where = ending.camera_link_low > 0 ? camera_link_text(ending) : std::string();
   return fmt::format("E{} {}{}", static_cast<int>(ending.fault), row.text, where);
+}
+
+std::optional<PlanesRecord> planes_record(std::uint64_t looks, const VoxelMap& map, const MapPlanes& planes) {
+  if (!planes.choice().any()) return std::nullopt;
+  return PlanesRecord{count_planes(map, planes), looks};
 }
 
 }  // namespace
@@ -179,7 +185,7 @@ void Cart::stop_arm(Instant now) { devices_.arm.stop(now); }
 
 void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<const std::byte> arguments) {
   if (kind != JobKind::kIntegrate) {
-    awaited_job_ = number;
+    if (kind != JobKind::kColorLook) awaited_job_ = number;
   } else if (IntegrateArguments integrate; unpack(arguments, integrate) && integrate.at_view) {
     awaited_look_ = number;
   }
@@ -321,6 +327,11 @@ RunRecord Cart::record() const {
     r.mapping = mapping_record();
     r.map_pictures = with_map_pictures([](const MapPictureInputs& inputs) { return map_pictures(inputs); });
     r.mapping->objects = find_objects(bench_->map(), collision_class);
+    bench_->label_objects(r.mapping->objects);
+    r.mapping->planes = planes_record(bench_->looks_colored(), bench_->map(), bench_->planes());
+    if (const auto& colors = bench_->planes().color)
+      for (MapPicture& picture : color_pictures(bench_->map(), *colors, r.mapping->objects))
+        r.map_pictures.push_back(std::move(picture));
     for (MapPicture& picture : object_pictures(bench_->map(), r.mapping->objects))
       r.map_pictures.push_back(std::move(picture));
     r.mapping->objects.id_of.clear();
@@ -357,7 +368,11 @@ MapFiles Cart::map_files() const {
   auto ot = into(files.map_ot);
   write_ot(bench_->map(), kOctreeDepth, ot);
   auto ply = into(files.map_ply);
-  write_ply(bench_->map(), false, ply);
+  write_ply(bench_->map(), false, ply, bench_->planes());
+  if (const auto& colors = bench_->planes().color) {
+    auto color_ot = into(files.color_map_ot);
+    write_color_ot(bench_->map(), *colors, kOctreeDepth, color_ot);
+  }
   if (const VoxelMap* fine = bench_->fine_map()) {
     auto fine_bt = into(files.fine_map_bt);
     write_bt(*fine, octomap_class, kOctreeDepth, fine_bt);

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "algorithms/calibration/touched_board.hpp"
+#include "algorithms/mapping/map_planes.hpp"
 #include "app/config/board_config.hpp"
 #include "app/config/load_config.hpp"
 
@@ -48,6 +49,7 @@ MachineSettings machine_settings(const Config& config, RunScope scope) {
   s.verify_views = config.calibration.verify_views;
   s.see_on_the_way = config.calibration.time_offset == "estimate";
   s.depth_beside = config.calibration.depth == "estimate";
+  s.color_at_looks = planes_from_words(config.map.planes).value_or(PlaneChoice{}).color;
   s.explore_views_max = config.explore.views_max;
   // The thesis's sensor was off while the arm moved and a map was loaded.
   s.frames_while_moving_hz = config.explore.views == "thesis2014" ? 0 : config.explore.frames_while_moving_hz;

@@ -48,6 +48,12 @@ class ColorCamera : public FrameStream {
  public:
   /// Copies the frame's grey values into `image`, which has the size of intrinsics(). May be called on a job's thread.
   [[nodiscard]] virtual Status read(const Frame& frame, MutableGrayImage image) = 0;
+  /// Whether read_color() gives pixels. A grey camera has none.
+  [[nodiscard]] virtual bool delivers_color() const { return false; }
+  /// The same in colours: red, green, blue.
+  [[nodiscard]] virtual Status read_color(const Frame& frame, ImageView<std::array<std::uint8_t, 3>>) {
+    return failure(Fault::kFrameRefused, "colour frame {}: the camera delivers grey values only", frame.sequence);
+  }
   /// Corners of one of the targets that the camera was told to look for, by its number, instead of pixels: for cameras
   /// that deliver them (`--sensor fast`); empty optional: use read().
   [[nodiscard]] virtual std::optional<CornerObservation> read_corners(const Frame& frame, int target) = 0;

@@ -21,7 +21,7 @@ constexpr double kGrayOfFullLight = 255;
 constexpr float kBlurSigma_px = 0.6F;  // of lens and sensor together, a webcam in focus
 constexpr float kNoiseSigma = 2.0F;    // grey levels
 constexpr float kBodyReflectance = 0.55F;
-constexpr std::uint64_t kGrayNoise = 2, kSampleJitter = 3;
+constexpr std::uint64_t kGrayNoise = 2, kSampleJitter = 3, kColorNoise = 16;  // the last three: one for each colour
 constexpr int kBoardSamples = 8;   // in each direction, where a pixel sees nothing but the board: by formula
 constexpr int kTracedSamples = 4;  // in each direction, at other edges: rays
 
@@ -38,14 +38,17 @@ struct Sample {
 class ColorFrame {
  public:
   ColorFrame(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
-             const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, WorkerPool* workers)
-      : scene_(scene),
+             const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, Channel channel,
+             WorkerPool* workers)
+      : channel_(channel),
+        scene_(scene),
         tracer_(tracer),
         rays_(rays),
         workers_(workers),
         base_T_camera_(base_T_camera.pose()),
         body_(exposure.body, base_T_camera_, base_T_camera.translation()),
-        noise_(exposure.seed, exposure.frame, kGrayNoise),
+        noise_(exposure.seed, exposure.frame,
+               channel == Channel::kGray ? kGrayNoise : kColorNoise + static_cast<std::uint64_t>(channel)),
         jitter_(exposure.seed, exposure.frame, kSampleJitter),
         gray_(rays.x.size()),
         seen_(rays.x.size()) {
@@ -124,6 +127,10 @@ class ColorFrame {
             static_cast<std::int32_t>(board.placed.solid) * kFaces + (reflectance == kBlack ? kDark : kLight)};
   }
 
+  [[nodiscard]] float reflectance(const Surface& surface) const {
+    return channel_ == Channel::kGray ? surface.gray() : surface.color[static_cast<std::size_t>(channel_)];
+  }
+
   [[nodiscard]] float brightness(double reflectance, const Vector3d& point, const Vector3d& normal) const {
     return static_cast<float>(kGrayOfFullLight * shade(scene_.light, reflectance, point, normal));
   }
@@ -144,7 +151,7 @@ class ColorFrame {
         base_T_camera_.translation() + static_cast<double>(row.t[i]) * Vector3d(row.x[i], row.y[i], row.z[i]);
     int axis = 0;
     normal.cwiseAbs().maxCoeff(&axis);
-    return {brightness(scene_.solids[solid].surface.gray(), point, normal),
+    return {brightness(reflectance(scene_.solids[solid].surface), point, normal),
             row.solid[i] * kFaces + 2 * axis + (normal[axis] > 0 ? 1 : 0)};
   }
 
@@ -256,6 +263,7 @@ class ColorFrame {
     });
   }
 
+  const Channel channel_;
   const Scene& scene_;
   const RayTracer& tracer_;
   const PixelRays& rays_;
@@ -280,9 +288,9 @@ double shade(const Light& light, double reflectance, const Vector3d& point_m, co
 }
 
 void render_color_image(const Scene& scene, const RayTracer& tracer, const PixelRays& rays,
-                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out,
-                        WorkerPool* workers) {
-  ColorFrame(scene, tracer, rays, base_T_camera, exposure, workers).render(out);
+                        const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, Channel channel,
+                        MutableGrayImage out, WorkerPool* workers) {
+  ColorFrame(scene, tracer, rays, base_T_camera, exposure, channel, workers).render(out);
 }
 
 }  // namespace firstlook::sim

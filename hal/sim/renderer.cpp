@@ -76,7 +76,19 @@ const CameraIntrinsics& Renderer::depth_intrinsics(DepthDetail detail) const {
 void Renderer::render_color(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
                             MutableGrayImage out) const {
   ENSURE(5211, out.width == state_->color.camera.width && out.height == state_->color.camera.height);
-  render_color_image(state_->scene, state_->tracer, state_->color, base_T_camera, exposure, out, state_->workers);
+  render_color_image(state_->scene, state_->tracer, state_->color, base_T_camera, exposure, Channel::kGray, out,
+                     state_->workers);
+}
+
+void Renderer::render_rgb(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
+                          ImageView<std::array<std::uint8_t, 3>> out) const {
+  ENSURE(5214, out.width == state_->color.camera.width && out.height == state_->color.camera.height);
+  std::vector<std::uint8_t> one(out.size());
+  for (const Channel channel : {Channel::kRed, Channel::kGreen, Channel::kBlue}) {
+    render_color_image(state_->scene, state_->tracer, state_->color, base_T_camera, exposure, channel,
+                       {one.data(), out.width, out.height}, state_->workers);
+    for (std::size_t i = 0; i < one.size(); ++i) out.data[i][static_cast<std::size_t>(channel)] = one[i];
+  }
 }
 
 void Renderer::render_depth(const Transform<Base, Depth>& base_T_depth, const Exposure& exposure, DepthDetail detail,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -68,6 +69,9 @@ class Renderer {
 
   /// Grey values as the mount's colour camera delivers them; `out` has the size of scene().mount.color.
   void render_color(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure, MutableGrayImage out) const;
+  /// The same view in colours: red, green, blue.
+  void render_rgb(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
+                  ImageView<std::array<std::uint8_t, 3>> out) const;
   /// Millimetres along the optical axis, 0 without return; `out` has the size of depth_intrinsics(detail).
   void render_depth(const Transform<Base, Depth>& base_T_depth, const Exposure& exposure, DepthDetail detail,
                     ImageView<std::uint16_t> out) const;

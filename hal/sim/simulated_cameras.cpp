@@ -54,6 +54,16 @@ Status SimulatedColorCamera::read(const hal::Frame& frame, MutableGrayImage imag
   return {};
 }
 
+Status SimulatedColorCamera::read_color(const hal::Frame& frame, ImageView<std::array<std::uint8_t, 3>> image) {
+  const memory::SimulationScope simulation;
+  if (Status status = check_size(image, intrinsics_); !status) return status;
+  const Result<ExposedFrame> held = clock_.find(frame);
+  if (!held) return std::unexpected(held.error());
+  scenes_.at(held->exposed)
+      .renderer.render_rgb(rig_.base_T_camera(held->true_joints_rad), rig_.exposure(*held, seed_), image);
+  return {};
+}
+
 std::optional<hal::CornerObservation> SimulatedColorCamera::read_corners(const hal::Frame& frame, int target) {
   const memory::SimulationScope simulation;
   if (!delivers_corners_) return std::nullopt;

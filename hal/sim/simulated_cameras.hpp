@@ -36,6 +36,8 @@ class SimulatedColorCamera final : public hal::ColorCamera {
   [[nodiscard]] Instant next_due() const override { return clock_.next_due(); }
   [[nodiscard]] hal::StreamCounters counters() const override { return clock_.counters(); }
   [[nodiscard]] Status read(const hal::Frame& frame, MutableGrayImage image) override;
+  [[nodiscard]] bool delivers_color() const override { return true; }
+  [[nodiscard]] Status read_color(const hal::Frame& frame, ImageView<std::array<std::uint8_t, 3>> image) override;
   [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame, int target) override;
 
  private:

@@ -1,5 +1,6 @@
 /// What every camera must do, whoever implements it.
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <vector>
 
 #include "tests/conformance/simulated_devices.hpp"
@@ -34,6 +35,9 @@ struct Mock {
   Camera camera, lossy;
 };
 using MockColor = Mock<mock::MockColorCamera, std::uint8_t>;
+struct MockWithColors : MockColor {
+  MockWithColors() { camera.color = std::array<std::uint8_t, 3>{camera.gray, camera.gray, camera.gray}; }
+};
 using MockDepth = Mock<mock::MockDepthCamera, std::uint16_t>;
 
 template <typename Pixel>
@@ -130,6 +134,37 @@ TEMPLATE_TEST_CASE("reading is repeatable and refuses an image of the wrong size
   ImageView<typename TestType::Pixel> wrong = once.view();
   wrong.height /= 2;
   CHECK_FALSE(device.camera.read(*frame, wrong).has_value());
+}
+
+TEMPLATE_TEST_CASE("a camera with colours gives them as it gives grey values, a grey one says that it has none",
+                   "[hal][camera]", SimulatedColor, MockColor, MockWithColors) {
+  TestType device;
+  const auto frame = device.camera.poll(at(1));
+  REQUIRE(frame.has_value());
+  Image<std::array<std::uint8_t, 3>> once(device.camera.intrinsics()), again(device.camera.intrinsics());
+  if (!device.camera.delivers_color()) {
+    CHECK_FALSE(device.camera.read_color(*frame, once.view()).has_value());
+    return;
+  }
+  Image<std::uint8_t> gray(device.camera.intrinsics());
+  REQUIRE(device.camera.read_color(*frame, once.view()).has_value());
+  REQUIRE(device.camera.read_color(*frame, again.view()).has_value());
+  REQUIRE(device.camera.read(*frame, gray.view()).has_value());
+  CHECK(once.pixels == again.pixels);
+  double difference = 0;  // ITU-R BT.601 makes the one of the other, up to noise
+  for (std::size_t i = 0; i < gray.pixels.size(); ++i) {
+    const auto& [red, green, blue] = once.pixels[i];
+    difference += std::abs(0.299 * red + 0.587 * green + 0.114 * blue - gray.pixels[i]);
+  }
+  CHECK(difference / static_cast<double>(gray.pixels.size()) < 3);
+  auto wrong = once.view();
+  wrong.width /= 2;
+  CHECK_FALSE(device.camera.read_color(*frame, wrong).has_value());
+  hal::Frame gone = *frame;
+  gone.sequence += 1000;
+  const Status missing = device.camera.read_color(gone, once.view());
+  REQUIRE_FALSE(missing.has_value());
+  CHECK(missing.error().fault == Fault::kFrameGone);
 }
 
 TEMPLATE_TEST_CASE("depth is in the units that the camera states", "[hal][camera]", SimulatedDepth, MockDepth) {

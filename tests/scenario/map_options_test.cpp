@@ -57,6 +57,52 @@ TEST_CASE("options of the map are off by default and do what they say", "[scenar
   CHECK(fine["free"].get<int>() > 10000);
 }
 
+TEST_CASE("colours, labels and sensors of voxels", "[scenario]") {
+  const JobFolder folder;
+  const auto run = [&](const std::string& planes) {
+    folder.write(planes + ".yaml", "explore: {views_max: 3}\nmap: {planes: \"" + planes + "\"}\n");
+    const ProgramResult done = folder.run_job(planes, {"--config", planes + ".yaml"});
+    INFO(done.err);
+    CHECK(done.exit_code == 0);
+    Json result = folder.read_json(planes + "/result.json");
+    check_safe(result);
+    CHECK(folder.run({"replay", planes + "/journal.flj"}).exit_code == 0);
+    return result;
+  };
+  const Json plain = run("none");
+  CHECK(plain["mapping"]["planes"].is_null());
+  CHECK_FALSE(std::filesystem::exists(folder / "none/color_map.ot"));
+
+  // What nobody looks at in colours costs nothing of the job: the same maps.
+  const Json labelled = run("label,sensor");
+  CHECK(labelled["decisions_hash"] == plain["decisions_hash"]);
+  for (const std::string name : {"collision_map.bt", "map.ot", "views.csv"})
+    CHECK(folder.read("none/" + name) == folder.read("label,sensor/" + name));
+  const auto peak = [](const Json& result) { return result["memory"]["peak_bytes"].get<std::int64_t>(); };
+  const auto voxels = [](const Json& result) {
+    const Json& v = result["mapping"]["grid_voxels"];
+    return v["unknown"].get<std::int64_t>() + v["free"].get<std::int64_t>() + v["occupied"].get<std::int64_t>();
+  };
+  CHECK(peak(labelled) == peak(plain) + 5 * voxels(plain));
+
+  const Json all = run("color,label,sensor");
+  const Json& planes = all["mapping"]["planes"];
+  CHECK(planes["color"]["looks"].get<int>() >= 3);
+  CHECK(2 * planes["color"]["voxels"].get<int>() > planes["color"]["of_occupied"].get<int>());
+  CHECK(planes["label"]["voxels"].get<int>() > 100);
+  CHECK(planes["sensor"]["voxels"].size() == 1);
+  CHECK(folder.read("color,label,sensor/color_map.ot").find("\nid ColorOcTree\n") != std::string::npos);
+  CHECK(folder.read("color,label,sensor/report.html").find("have a colour, from") != std::string::npos);
+  REQUIRE(folder.run({"export", "color,label,sensor", "--to", "csv"}).exit_code == 0);
+  const std::string csv = folder.read("color,label,sensor/export/csv/voxels.csv");
+  CHECK(csv.starts_with("x_m,y_m,z_m,class,log_odds,red,green,blue,object,shape,sensor\n"));
+
+  folder.write("wrong.yaml", "map: {planes: colour}\n");
+  const ProgramResult wrong = folder.run_job("wrong", {"--config", "wrong.yaml"});
+  CHECK(wrong.exit_code == 3);
+  CHECK(wrong.err.find("map.planes must be none, or color, label, sensor") != std::string::npos);
+}
+
 TEST_CASE("the plane fit and a ground that clears only", "[scenario]") {
   // The empty cell's floor is 0.85 m below the base.
   const std::string extents = "low_m: [-1.5, -1.5, -1.0]";

@@ -24,6 +24,16 @@ class MockColorCamera final : public MockStream<hal::ColorCamera> {
     std::ranges::fill(image.pixels(), gray);
     return {};
   }
+  /// Of every pixel; none: a grey camera.
+  std::optional<std::array<std::uint8_t, 3>> color;
+  [[nodiscard]] bool delivers_color() const override { return color.has_value(); }
+  [[nodiscard]] Status read_color(const hal::Frame& frame, ImageView<std::array<std::uint8_t, 3>> image) override {
+    if (!color) return hal::ColorCamera::read_color(frame, image);
+    if (!holds(frame)) return failure(Fault::kFrameGone, "colour frame {}", frame.sequence);
+    if (!fits(image)) return failure(Fault::kFrameRefused, "wrong size");
+    std::ranges::fill(image.pixels(), *color);
+    return {};
+  }
   [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame, int target) override {
     if (!corners || !holds(frame)) return std::nullopt;
     return corners(frame, target);

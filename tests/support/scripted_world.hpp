@@ -94,6 +94,8 @@ class ScriptedWorld : public DecisionSink {
   std::size_t segments_after_stop = 0;
   int forgotten = 0;
   mutable int seen_on_the_way = 0;  ///< frames of moving cameras that were looked at
+  mutable int looks = 0;            ///< at depth
+  mutable int colored = 0;          ///< of them, those that colours were asked of
   bool ended = false;
   Ending ending;
   Instant now{};
@@ -191,6 +193,7 @@ class ScriptedWorld : public DecisionSink {
         return pack(validate, result);
       case JobKind::kIntegrate: {
         IntegrateResult r = integrated;
+        looks += arguments_of<IntegrateArguments>(arguments).at_view ? 1 : 0;
         r.at_view = arguments_of<IntegrateArguments>(arguments).at_view;
         return pack(r, result);
       }
@@ -205,6 +208,9 @@ class ScriptedWorld : public DecisionSink {
         return pack(NoArguments{}, result);
       case JobKind::kTouchTest:
         return pack(touch_test(arguments_of<TouchTestArguments>(arguments)), result);
+      case JobKind::kColorLook:
+        ++colored;
+        return pack(ColorResult{}, result);
       case JobKind::kSeeOnTheWay:
         ++seen_on_the_way;
         return pack(WayResult{true, true}, result);

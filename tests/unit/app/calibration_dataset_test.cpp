@@ -15,8 +15,8 @@
 
 #include "algorithms/calibration/verdict.hpp"
 #include "app/cli/calibrate_command.hpp"
-#include "app/dataset/gray_image_file.hpp"
 #include "app/dataset/hand_eye_file.hpp"
+#include "app/dataset/picture_file.hpp"
 #include "tests/support/recorded_data.hpp"
 #include "tests/support/sanitized_builds.hpp"
 #include "tests/unit/calibration/synthetic_views.hpp"

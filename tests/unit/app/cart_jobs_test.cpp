@@ -25,9 +25,12 @@ const JointVector kStart{0, -1.57, 1.57, -1.57, -1.57, 0};  // the simulated cel
 /// The flange's camera looks at a board 0.7 m ahead of where the arm starts; the depth camera at a wall.
 class Bench {
  public:
-  explicit Bench(std::optional<StoredCalibration> stored = std::nullopt, const std::string& prior_map = "none")
+  explicit Bench(std::optional<StoredCalibration> stored = std::nullopt, const std::string& prior_map = "none",
+                 const std::string& planes = "none")
       : color_(kColor), workers_(2) {
     config_.map.prior = prior_map;
+    config_.map.planes = planes;
+    color_.color = {10, 120, 230};
     color_.corners = [this](const hal::Frame& frame, int) {
       JointVector q = at_rad_;
       q[0] += swing_rad * static_cast<double>(frame.sequence % 7);
@@ -101,6 +104,7 @@ class Bench {
     arguments.arm_rad = q;
     return arguments;
   }
+  ColorArguments color_of(const PosedFrame& depth) { return {frame(color_, depth.at_rad), depth}; }
   [[nodiscard]] FromHere here(std::uint32_t step = 0) const { return {kStart, step, now_.seconds()}; }
 
   /// Takes views all around until the calibration can be solved.
@@ -417,6 +421,83 @@ TEST_CASE("a depth picture that repeats itself is frozen, one with hardly a retu
     CHECK_FALSE(integrate().frozen);
     CHECK_FALSE(integrate().frozen);
   }
+}
+
+TEST_CASE("the voxels that a look hit take the colours of the frame beside it", "[jobs][planes]") {
+  Bench bench(std::nullopt, "none", "color,sensor");
+  bench.calibrate();
+  const MapPlanes& planes = bench.bench().planes();
+  const auto colored = [&] {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < bench.bench().map().size(); ++i) {
+      const auto color = planes.color->at(i);
+      count += color ? 1 : 0;
+      if (color) REQUIRE(*color == Rgb{10, 120, 230});
+      if (color) REQUIRE(bench.bench().map().voxel_class(i) == VoxelClass::kOccupied);
+    }
+    return count;
+  };
+  const auto points = [&](const ColorArguments& arguments) {
+    return bench.result_of<ColorResult>(JobKind::kColorLook, arguments).points;
+  };
+  const IntegrateArguments look = bench.depth_look(kStart);
+  CHECK(points(bench.color_of(look.frame)) == 0);  // nothing was integrated yet
+  REQUIRE(bench.result_of<IntegrateResult>(JobKind::kIntegrate, look).used);
+  ColorArguments moved = bench.color_of(look.frame);
+  moved.color.at_rad[0] += 0.01;
+  CHECK(points(moved) == 0);
+  ColorArguments other = bench.color_of(look.frame);
+  other.depth.frame.sequence += 1;
+  CHECK(points(other) == 0);
+  CHECK(colored() == 0);
+  CHECK(bench.bench().looks_colored() == 0);
+  CHECK(points(bench.color_of(look.frame)) > 100);
+  CHECK(colored() > 3);
+  CHECK(bench.bench().looks_colored() == 1);
+
+  const VoxelMap& map = bench.bench().map();
+  for (std::size_t i = 0; i < map.size(); ++i)
+    REQUIRE(planes.sensor->at(i) == (map.voxel_class(i) == VoxelClass::kUnknown ? 0 : 1));
+}
+
+TEST_CASE("colours are asked of a camera that has some, and take their memory at boot", "[jobs][planes]") {
+  mock::MockColorCamera color(kColor);
+  mock::MockDepthCamera depth;
+  WorkerPool workers(1);
+  Config config;
+  const CellFacts facts{kStart, {}, std::nullopt};
+  const auto voxel_bytes = [&] {
+    memory::reset_accounts();
+    const auto bench = Workbench::make(config, facts, color, depth, workers);
+    REQUIRE(bench);
+    return memory::accounted_bytes(memory::Pool::kVoxelPlanes);
+  };
+  const std::size_t without = voxel_bytes();
+  const std::size_t voxels = 60 * 60 * 36;
+  config.map.planes = "label,sensor";
+  CHECK(voxel_bytes() == without + 5 * voxels);
+  config.map.planes = "color";
+  const auto refused = Workbench::make(config, facts, color, depth, workers);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().fault == Fault::kConfigBadValue);
+  CHECK(refused.error().detail() == "map.planes: color: the colour camera delivers grey values only");
+  color.color = {1, 2, 3};
+  CHECK(voxel_bytes() == without + 16 * voxels);
+
+  // A finer map that just fits does not together with planes.
+  config.map.fine_resolution_m = 0.009;
+  config.map.fine_low_m = config.map.low_m;
+  config.map.fine_high_m = config.map.high_m;
+  config.map.planes = "none";
+  CHECK(voxel_bytes() > without);
+  config.map.planes = "color,label,sensor";
+  const auto full = Workbench::make(config, facts, color, depth, workers);
+  REQUIRE_FALSE(full);
+  CHECK(full.error().fault == Fault::kMapTooLarge);
+  const std::string_view why = full.error().detail();
+  CHECK(why.find("0.05 m with map.planes and the finer map need ") != std::string_view::npos);
+  CHECK(why.ends_with(" MiB, the budget holds 24.0 MiB"));
+  memory::reset_accounts();
 }
 
 TEST_CASE("broken frames and frames of an uncertain pose change nothing and are counted by kind", "[jobs][safety]") {

@@ -345,6 +345,28 @@ TEST_CASE("frames on the way between calibration views are looked at, and nobody
   CHECK(plain.seen_on_the_way == 0);
 }
 
+TEST_CASE("looks at depth give the map its colours where it wants them, and nobody waits for that", "[machine]") {
+  for (const bool wanted : {false, true}) {
+    MachineSettings settings = ScriptedWorld::default_settings();
+    settings.color_at_looks = wanted;
+    ScriptedWorld world(settings);
+    REQUIRE(world.run_until(StateId::kReady));
+    world.press(OperatorAction::kPlay);
+    CHECK(world.run_to_end());
+    CHECK(world.ending.outcome == Outcome::kDone);
+    CHECK(world.looks > 2);
+    CHECK(world.colored == (wanted ? world.looks : 0));
+  }
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.color_at_looks = true;
+  ScriptedWorld failing(settings);
+  failing.failing = JobKind::kColorLook;
+  REQUIRE(failing.run_until(StateId::kReady));
+  failing.press(OperatorAction::kPlay);
+  CHECK(failing.run_to_end());
+  CHECK(failing.ending.outcome == Outcome::kDone);
+}
+
 TEST_CASE("stamps that run ahead are corrected: frames wait until the arm has been there", "[machine]") {
   ScriptedWorld world;
   world.frame_age = milliseconds(-100);

@@ -306,7 +306,7 @@ TEST_CASE("map prints counts that add up and writes files that OctoMap reads", "
   SmallDataset data;
   data.write();
   MapCommandOptions options;
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   options.out = data.folder / "out";
   options.json = true;
   const Printed printed = run(options, data.folder);
@@ -335,7 +335,7 @@ TEST_CASE("map tells usage from data by its exit code", "[app][map_command][host
   SmallDataset data;
   data.write();
   MapCommandOptions options;
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   const auto exit_code = [&] { return run(options, data.folder).exit_code; };
   CHECK(exit_code() == 0);
   for (const double bad : {0.0, -0.05, 1e-9, 7.0, std::nan("")}) {
@@ -348,9 +348,9 @@ TEST_CASE("map tells usage from data by its exit code", "[app][map_command][host
     CHECK(exit_code() == 2);
   }
   options.range_max_m = 5;
-  options.dataset = data.folder / "none";
+  options.datasets = {data.folder / "none"};
   CHECK(exit_code() == 3);
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   options.out = data.folder / "depth.txt" / "below-a-file";
   CHECK(exit_code() == 3);
   options.out.clear();
@@ -360,7 +360,7 @@ TEST_CASE("map tells usage from data by its exit code", "[app][map_command][host
   CHECK(exit_code() == 3);  // a grid from here to there fits no memory
   options.from = data.folder / "map.ot";
   CHECK(exit_code() == 2);  // and a dataset
-  options.dataset.clear();
+  options.datasets.clear();
   CHECK(exit_code() == 3);
   options.from.clear();
   CHECK(exit_code() == 2);
@@ -380,7 +380,7 @@ TEST_CASE("frames that cannot be are refused and counted, the others are mapped"
   write_png(data.folder / "depth/7.png", 65535);  // saturated
   data.write();
   MapCommandOptions options;
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   options.out = data.folder / "out";
   options.json = true;
   const Printed printed = run(options, data.folder);
@@ -402,7 +402,7 @@ TEST_CASE("frames that cannot be are refused and counted, the others are mapped"
   clean.depth += "9.00 depth/9.png\n";
   clean.poses += "9.00 0.18 0 0 0 0 0 1\n";
   clean.write();
-  options.dataset = clean.folder;
+  options.datasets = {clean.folder};
   options.out = clean.folder / "out";
   REQUIRE(run(options, clean.folder).exit_code == 0);
   CHECK(read_text(clean.folder / "out/map.ot") == read_text(data.folder / "out/map.ot"));
@@ -414,7 +414,7 @@ TEST_CASE("frames that cannot be are refused and counted, the others are mapped"
   write_png(data.folder / "depth/6.png", 5000);
   data.camera_info += "depth_scale: 5\n";  // wrong by 1000: a wall 1 km away would clear everything
   data.write();
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   CHECK(run(options, data.folder).exit_code == 3);
 }
 
@@ -423,7 +423,7 @@ TEST_CASE("saturated pixels clear nothing", "[app][map_command][hostile]") {
   write_png(data.folder / "depth/2.png", 5000, 16, kWidth, 65535);
   data.write();
   MapCommandOptions options;
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   options.json = true;
   const nlohmann::json result = nlohmann::json::parse(run(options, data.folder).text);
   const nlohmann::json pixels = result["frames"][1]["pixels"];
@@ -436,7 +436,7 @@ TEST_CASE("a place is told with its class, its frames and its neighbours", "[app
   SmallDataset data;
   data.write();
   MapCommandOptions options;
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   options.json = true;
   options.at = "0.02,0.02,1.02";
   const auto place = [&] { return nlohmann::json::parse(run(options, data.folder).text)["place"]; };
@@ -471,7 +471,7 @@ TEST_CASE("a stored map is read, asked and changed", "[app][map_command][octomap
   SmallDataset data;
   data.write();
   MapCommandOptions options;
-  options.dataset = data.folder;
+  options.datasets = {data.folder};
   options.out = data.folder / "out";
   options.objects = true;
   REQUIRE(run(options, data.folder).exit_code == 0);
@@ -522,7 +522,7 @@ TEST_CASE("real Kinect frames give OctoMap's classes voxel for voxel", "[app][ma
   }
   SmallDataset scratch;
   MapCommandOptions options;
-  options.dataset = folder;
+  options.datasets = {folder};
   options.out = scratch.folder / "out";
   REQUIRE(run(options, scratch.folder).exit_code == 0);
   std::unique_ptr<octomap::AbstractOcTree> read(octomap::AbstractOcTree::read((options.out / "map.ot").string()));

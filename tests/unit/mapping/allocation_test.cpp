@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
+#include "algorithms/mapping/color_registration.hpp"
 #include "algorithms/mapping/distance_field.hpp"
 #include "algorithms/mapping/insertion.hpp"
 #include "algorithms/mapping/open_rays.hpp"
@@ -105,6 +106,33 @@ TEST_CASE("views are counted and the distance field follows the map without an a
     CHECK(seen > 0);
     CHECK(allocations == 0);
   }
+}
+
+TEST_CASE("colours and sensors of a frame are noted without an allocation", "[mapping][memory]") {
+  const DepthSensor sensor = sensor_with(GENERATE(0.0, -0.1));
+  const CameraIntrinsics camera{80, 60, 66, 66, 39.5, 29.5, -0.1};
+  VoxelMap map(kGrid);
+  Inserter inserter(kGrid, sensor);
+  ColorRegistration registration(kGrid, sensor, camera);
+  MapPlanes planes(kGrid, {true, true, true});
+  const std::vector<Rgb> colors(80 * 60, Rgb{1, 2, 3});
+  const std::vector<float> self_m(static_cast<std::size_t>(kWidth) * kHeight, 1.2F);
+  Random random(7);
+  std::uint32_t colored = 0;
+  for (int frame = 0; frame < 4; ++frame) {
+    const std::vector<std::uint16_t> values = random_depth(random);
+    const Transform<Base, Depth> pose = random_pose(random);
+    const DepthImage depth{{values.data(), kWidth, kHeight}, 1000};
+    REQUIRE(inserter.insert(map, depth, pose, self_m, frame));
+    std::uint32_t colored = 0;
+    const std::uint64_t allocations = allocations_of([&] {
+      colored =
+          registration.add(*planes.color, depth, pose, self_m, {camera, {}}, {colors.data(), 80, 60}, inserter.hit());
+      planes.sensor->note(inserter.missed(), inserter.hit(), 1);
+    });
+    CHECK(allocations == 0);
+  }
+  CHECK(colored > 0);
 }
 
 }  // namespace firstlook

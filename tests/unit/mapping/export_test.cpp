@@ -4,6 +4,7 @@
 #include <string>
 
 #include "algorithms/mapping/moveit_scene.hpp"
+#include "algorithms/mapping/ply_reader.hpp"
 #include "algorithms/mapping/ply_writer.hpp"
 #include "platform/core/random.hpp"
 #include "tests/support/collect_bytes.hpp"
@@ -43,6 +44,85 @@ TEST_CASE("the point cloud holds the occupied voxels' centres", "[mapping][expor
       REQUIRE(voxel_class != VoxelClass::kUnknown);
     }
   }
+}
+
+namespace {
+
+MapPlanes random_planes(const VoxelMap& map, const PlaneChoice& choice) {
+  Random random(9);
+  MapPlanes planes(map.geometry(), choice);
+  const auto byte = [&random] { return static_cast<std::uint8_t>(random.below(255)); };
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (planes.color && random.below(3) > 0) planes.color->set(i, {byte(), byte(), byte()});
+    if (planes.label && random.below(3) > 0)
+      planes.label->set(i, {static_cast<std::uint16_t>(random.below(65536)), ObjectShape(random.below(3))});
+    if (planes.sensor) planes.sensor->set(i, byte());
+  }
+  return planes;
+}
+
+Result<MapPlanes> read_ply(const std::string& text, const GridGeometry& geometry) {
+  std::size_t at = 0;
+  return read_ply_planes(
+      [&](std::span<std::byte> out) {
+        const std::size_t size = std::min(out.size(), text.size() - at);
+        std::memcpy(out.data(), text.data() + at, size);
+        at += size;
+        return size;
+      },
+      geometry);
+}
+
+}  // namespace
+
+TEST_CASE("a point cloud keeps the planes of its voxels", "[mapping][export][planes]") {
+  const VoxelMap map = random_map(0.3, 4);
+  const std::string plain = collect([&](ByteSink sink) { write_ply(map, false, sink); });
+  for (int words = 0; words < 8; ++words) {
+    const PlaneChoice choice{(words & 1) != 0, (words & 2) != 0, (words & 4) != 0};
+    const MapPlanes planes = random_planes(map, choice);
+    const std::string text = collect([&](ByteSink sink) { write_ply(map, false, sink, planes); });
+    if (words == 0) CHECK(text == plain);
+    const auto read = read_ply(text, map.geometry());
+    REQUIRE(read);
+    REQUIRE(read->choice() == choice);
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      const bool occupied = map.voxel_class(i) == VoxelClass::kOccupied;
+      if (choice.color) REQUIRE(read->color->at(i) == (occupied ? planes.color->at(i) : std::nullopt));
+      if (choice.label) {
+        const VoxelLabel& label = read->label->at(i);
+        REQUIRE(label.object == (occupied ? planes.label->at(i).object : 0));
+        if (label.object != 0) REQUIRE(label.shape == planes.label->at(i).shape);
+      }
+      if (choice.sensor) REQUIRE(read->sensor->at(i) == (occupied ? planes.sensor->at(i) : 0));
+    }
+  }
+}
+
+TEST_CASE("a point cloud that is broken or not ours has no planes", "[mapping][export][planes][hostile]") {
+  const VoxelMap map = random_map(0.3, 4);
+  const MapPlanes planes = random_planes(map, {true, true, true});
+  const std::string text = collect([&](ByteSink sink) { write_ply(map, false, sink, planes); });
+  const auto refused = [&](const std::string& broken) {
+    const auto read = read_ply(broken, map.geometry());
+    return !read && read.error().fault == Fault::kMapUnreadable;
+  };
+  CHECK(refused(""));
+  CHECK(refused("ply\nformat ascii 1.0\nend_header\n"));
+  CHECK(refused(text.substr(0, 100)));
+  CHECK(refused(text.substr(0, text.size() - 1)));
+  const auto with = [&text](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    return changed.replace(changed.find(from), from.size(), to);
+  };
+  CHECK(refused(with("resolution 0.05", "resolution 0.06")));
+  CHECK(refused(with("property ushort label", "property ushort labels")));
+  CHECK(refused(with("property float x\n", "")));
+  // Points that are nowhere, a shape that is none.
+  std::string hostile = text;
+  const std::size_t data = hostile.find("end_header\n") + 11;
+  for (std::size_t i = data; i < hostile.size(); ++i) hostile[i] = static_cast<char>(i * 97 % 256);
+  CHECK(read_ply(hostile, map.geometry()));
 }
 
 TEST_CASE("merged boxes cover exactly the occupied voxels, each once", "[mapping][export]") {

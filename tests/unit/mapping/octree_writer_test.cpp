@@ -1,6 +1,9 @@
 #include "algorithms/mapping/octree_writer.hpp"
 
+#include <octomap/ColorOcTree.h>
+
 #include <algorithm>
+#include <map>
 
 #include "octree_bytes.hpp"
 
@@ -76,6 +79,49 @@ TEST_CASE("a coarser tree has what OctoMap's inner nodes say", "[mapping][octoma
       REQUIRE(full_node->getLogOdds() == expected->getLogOdds());
       REQUIRE(bt->isNodeOccupied(binary_node) == full.isNodeOccupied(expected));
     }
+  }
+}
+
+TEST_CASE("OctoMap reads a map with colours as a ColorOcTree", "[mapping][octomap][planes]") {
+  Random random(6);
+  const VoxelMap map = blocky_map(random);
+  ColorPlane colors(map.geometry());
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const auto gray = static_cast<std::uint8_t>(40 * random.below(6));
+    if (random.below(4) > 0) colors.set(i, {gray, static_cast<std::uint8_t>(random.below(2)), 7});
+  }
+  for (const int depth : {16, 15, 12}) {
+    std::istringstream stream(collect([&](ByteSink sink) { write_color_ot(map, colors, depth, sink); }));
+    const std::unique_ptr<octomap::AbstractOcTree> any(octomap::AbstractOcTree::read(stream));
+    const auto* tree = dynamic_cast<octomap::ColorOcTree*>(any.get());
+    REQUIRE(tree != nullptr);
+    const auto plain = read_ot(collect([&](ByteSink sink) { write_ot(map, depth, sink); }));
+    std::map<const octomap::ColorOcTreeNode*, std::pair<std::array<double, 3>, int>> blocks;  // by leaf
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      const Eigen::Vector3d c = map.geometry().center_m(map.geometry().voxel_at(i));
+      const auto* node = tree->search(c.x(), c.y(), c.z());
+      const auto* same = plain->search(c.x(), c.y(), c.z());
+      REQUIRE((node == nullptr) == (same == nullptr));
+      if (node == nullptr) continue;
+      REQUIRE(node->getLogOdds() == same->getLogOdds());
+      auto& [sum, points] = blocks[node];
+      const auto color = map.voxel_class(i) == VoxelClass::kOccupied ? colors.at(i) : std::nullopt;
+      if (!color) continue;
+      ++points;
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += (*color)[k];
+    }
+    int colored = 0;
+    for (const auto& [node, block] : blocks) {
+      const auto& [sum, points] = block;
+      REQUIRE(node->isColorSet() == (points > 0));
+      if (points == 0) continue;
+      ++colored;
+      const auto c = node->getColor();
+      REQUIRE(std::abs(c.r - sum[0] / points) <= 0.5);
+      REQUIRE(std::abs(c.g - sum[1] / points) <= 0.5);
+      REQUIRE(std::abs(c.b - sum[2] / points) <= 0.5);
+    }
+    CHECK(colored > 10);
   }
 }
 

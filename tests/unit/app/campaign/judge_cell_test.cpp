@@ -16,7 +16,8 @@ const char* const kResult = R"({
                                          {"voxels": 4, "reason": "occluded"}]},
   "safety": {"min_clearance_m": 0.02},
   "memory": {"peak_bytes": 1000, "loop_allocations_after_seal": 0}, "wall": {"stall_s": 3},
-  "truth": {"contacts": 1, "unknown_entries": 2, "coverage_of_observable": 0.995, "hand_eye_error_mm": null}})";
+  "truth": {"contacts": 1, "unknown_entries": 2, "coverage_of_observable": 0.995,
+            "to_95": {"time_s": 120.5, "views": 31}, "to_99": null, "hand_eye_error_mm": null}})";
 
 CellTraces traces(int exit_code, const std::string& outcome = "done") {
   CellTraces t;
@@ -45,6 +46,9 @@ TEST_CASE("figures are those of result.json", "[app][campaign]") {
   CHECK(cell.figures.robot_time_s == 512.5);
   CHECK(cell.figures.views == 60);
   CHECK(cell.figures.calibration_views == 15);
+  CHECK(cell.figures.time_to_95_s == 120.5);
+  CHECK(cell.figures.views_to_95 == 31);
+  CHECK_FALSE(cell.figures.time_to_99_s);
   CHECK(cell.figures.min_clearance_m == 0.02);
   CHECK(cell.figures.contacts == 1);
   CHECK(cell.figures.unknown_entries == 2);

@@ -1,5 +1,5 @@
 /// The adapter to libpng and libjpeg: their types and error handling end here.
-#include "app/dataset/gray_image_file.hpp"
+#include "app/dataset/picture_file.hpp"
 
 #include <png.h>
 
@@ -23,17 +23,26 @@ struct CloseFile {
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
-GrayPixels make_picture(unsigned width, unsigned height) {
-  return {std::vector<std::uint8_t>(static_cast<std::size_t>(width) * height), static_cast<int>(width),
-          static_cast<int>(height)};
+/// Bytes of pixels, one or three each.
+struct Picture {
+  std::vector<std::uint8_t> bytes;
+  unsigned width = 0;
+  unsigned height = 0;
+};
+
+enum class Channels : unsigned { kGray = 1, kColor = 3 };
+
+Picture make_picture(unsigned width, unsigned height, Channels channels) {
+  return {std::vector<std::uint8_t>(static_cast<std::size_t>(width) * height * static_cast<unsigned>(channels)), width,
+          height};
 }
 
-Result<GrayPixels> refuse_size(const std::string& name, unsigned width, unsigned height) {
+Result<Picture> refuse_size(const std::string& name, unsigned width, unsigned height) {
   return failure(Fault::kDataMalformed, "{}: a picture of {}x{} pixels, at most {} each way", name, width, height,
                  kSideMax_px);
 }
 
-Result<GrayPixels> read_png(const std::filesystem::path& file) {
+Result<Picture> read_png(const std::filesystem::path& file, Channels channels) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_file(&png, file.c_str()) == 0) {
@@ -44,10 +53,10 @@ Result<GrayPixels> read_png(const std::filesystem::path& file) {
     return refuse_size(file.string(), png.width, png.height);
   }
   png.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;  // 16-bit values are cut to 8 bits, not converted from linear light
-  png.format = PNG_FORMAT_GRAY;
-  GrayPixels picture = make_picture(png.width, png.height);
+  png.format = channels == Channels::kGray ? PNG_FORMAT_GRAY : PNG_FORMAT_RGB;
+  Picture picture = make_picture(png.width, png.height, channels);
   const png_color black{0, 0, 0};  // under what is transparent
-  if (png_image_finish_read(&png, &black, picture.pixels.data(), 0, nullptr) == 0) {
+  if (png_image_finish_read(&png, &black, picture.bytes.data(), 0, nullptr) == 0) {
     return failure(Fault::kDataMalformed, "{}: {}", file.string(), png.message);
   }
   return picture;
@@ -76,7 +85,8 @@ void keep_silent(j_common_ptr) {}
 enum class JpegOutcome { kRead, kBroken, kTooLarge };
 
 /// No object with a destructor lives here: errors jump out of the middle of it.
-JpegOutcome decode_jpeg(std::FILE* stream, jpeg_decompress_struct* info, JpegErrors* errors, GrayPixels* picture) {
+JpegOutcome decode_jpeg(std::FILE* stream, Channels channels, jpeg_decompress_struct* info, JpegErrors* errors,
+                        Picture* picture) {
   info->err = jpeg_std_error(&errors->manager);
   errors->manager.error_exit = leave_jpeg;
   errors->manager.emit_message = leave_jpeg_at_warning;
@@ -85,23 +95,24 @@ JpegOutcome decode_jpeg(std::FILE* stream, jpeg_decompress_struct* info, JpegErr
   jpeg_create_decompress(info);
   jpeg_stdio_src(info, stream);
   jpeg_read_header(info, TRUE);
-  info->out_color_space = JCS_GRAYSCALE;
+  info->out_color_space = channels == Channels::kGray ? JCS_GRAYSCALE : JCS_RGB;
   if (info->image_width > kSideMax_px || info->image_height > kSideMax_px) return JpegOutcome::kTooLarge;
   jpeg_start_decompress(info);
-  *picture = make_picture(info->output_width, info->output_height);
+  *picture = make_picture(info->output_width, info->output_height, channels);
+  const std::size_t row_bytes = static_cast<std::size_t>(info->output_width) * static_cast<unsigned>(channels);
   while (info->output_scanline < info->output_height) {
-    JSAMPROW row = picture->pixels.data() + static_cast<std::size_t>(info->output_scanline) * info->output_width;
+    JSAMPROW row = picture->bytes.data() + info->output_scanline * row_bytes;
     jpeg_read_scanlines(info, &row, 1);
   }
   jpeg_finish_decompress(info);
   return JpegOutcome::kRead;
 }
 
-Result<GrayPixels> read_jpeg(const std::filesystem::path& file, std::FILE* stream) {
+Result<Picture> read_jpeg(const std::filesystem::path& file, std::FILE* stream, Channels channels) {
   jpeg_decompress_struct info{};
   JpegErrors errors{};
-  GrayPixels picture;
-  const JpegOutcome outcome = decode_jpeg(stream, &info, &errors, &picture);
+  Picture picture;
+  const JpegOutcome outcome = decode_jpeg(stream, channels, &info, &errors, &picture);
   const unsigned width = info.image_width, height = info.image_height;
   jpeg_destroy_decompress(&info);
   if (outcome == JpegOutcome::kTooLarge) return refuse_size(file.string(), width, height);
@@ -111,9 +122,7 @@ Result<GrayPixels> read_jpeg(const std::filesystem::path& file, std::FILE* strea
   return picture;
 }
 
-}  // namespace
-
-Result<GrayPixels> read_gray_image(const std::filesystem::path& file) {
+Result<Picture> read_picture(const std::filesystem::path& file, Channels channels) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) {
     return failure(Fault::kDataMissing, "{}: no such file", file.string());
@@ -126,12 +135,29 @@ Result<GrayPixels> read_gray_image(const std::filesystem::path& file) {
     return failure(Fault::kDataMissing, "{}: cannot be read from its start", file.string());
   }
   try {
-    if (read == start.size() && png_sig_cmp(start.data(), 0, start.size()) == 0) return read_png(file);
-    if (read > 2 && start[0] == 0xFF && start[1] == 0xD8) return read_jpeg(file, stream.get());
+    if (read == start.size() && png_sig_cmp(start.data(), 0, start.size()) == 0) return read_png(file, channels);
+    if (read > 2 && start[0] == 0xFF && start[1] == 0xD8) return read_jpeg(file, stream.get(), channels);
   } catch (const std::bad_alloc&) {
     return failure(Fault::kOutOfMemory, "{}: reading the picture", file.string());
   }
   return failure(Fault::kDataMalformed, "{}: neither PNG nor JPEG", file.string());
+}
+
+}  // namespace
+
+Result<GrayPixels> read_gray_image(const std::filesystem::path& file) {
+  Result<Picture> picture = read_picture(file, Channels::kGray);
+  if (!picture) return std::unexpected(picture.error());
+  return GrayPixels{std::move(picture->bytes), static_cast<int>(picture->width), static_cast<int>(picture->height)};
+}
+
+Result<ColorPixels> read_color_image(const std::filesystem::path& file) {
+  const Result<Picture> picture = read_picture(file, Channels::kColor);
+  if (!picture) return std::unexpected(picture.error());
+  ColorPixels colors{{}, static_cast<int>(picture->width), static_cast<int>(picture->height)};
+  colors.pixels.resize(picture->bytes.size() / 3);
+  std::memcpy(colors.pixels.data(), picture->bytes.data(), picture->bytes.size());
+  return colors;
 }
 
 }  // namespace firstlook
