@@ -56,6 +56,7 @@ void FarReturns::learn(const DepthImage& depth, const CameraIntrinsics& camera,
   const ImageView<const std::uint16_t>& pixels = depth.pixels;
   ENSURE(4561, pixels.width == camera.width && pixels.height == camera.height && depth.units_per_m > 0);
   ENSURE(4562, self_depth_m.empty() || self_depth_m.size() == pixels.size());
+  if (!cells_.contains(cells_.voxel(base_T_depth.translation()))) return;  // no arm reaches there
   const int step = std::max(1, camera.width / kColumnsMax);
   // One pixel without a return says nothing: edges and dark spots have them, too.
   const auto is_hole = [&](int u, int v) {

@@ -85,7 +85,8 @@ void GainModel::prepare(const ViewContext& context) {
         if (counts && needs_backing(i)) backed_only_m_.extend(geometry_.center_m(geometry_.voxel_at(i)));
         break;
       case VoxelClass::kFree:
-        plane[i] = counts && !futile && needs_again(context, i) ? kAgainWeight : kPass;
+        plane[i] =
+            counts && futile_.count(i) < sampling_.again_futile_max && needs_again(context, i) ? kAgainWeight : kPass;
         break;
     }
   }
@@ -161,8 +162,8 @@ ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, 
   ViewGain gain = count_along(rays);
   if (far_.knows_openings() && gain.unknown + gain.again > 0) {
     const ViewGain sure = count_along(returning_rays(base_T_depth, rays, worker));
-    gain.doubtful = gain.unknown - sure.unknown;
-    gain.doubtful_again = gain.again - sure.again;
+    gain.doubtful = gain.unknown - std::min(gain.unknown, sure.unknown);
+    gain.doubtful_again = gain.again - std::min(gain.again, sure.again);
   }
   gain.unknown += count_backed(context, base_T_depth, rays, worker.scratch);
   if (context.prior != nullptr) {
@@ -233,7 +234,9 @@ std::size_t GainModel::remember_look(const ViewContext& context, const JointVect
       const VoxelClass voxel = context.map.voxel_class(i);
       const bool in_range = entry * end.z() >= sensor_.range_min_m;
       const bool unknown = voxel == VoxelClass::kUnknown;
-      if (in_range && context.zone[i] != 0 && (unknown || needs_again(context, i)) && worker.scratch.mark(i)) {
+      // A voxel that this look has just freed for the first time was not looked at in vain.
+      const bool in_vain = unknown || (plane_.what()[i] == kAgainWeight && needs_again(context, i));
+      if (in_range && context.zone[i] != 0 && in_vain && worker.scratch.mark(i)) {
         futile_.add(i, unknown && is_backed(context.map, base_T_depth.translation(),
                                             (base_T_depth * end - base_T_depth.translation()).normalized()));
         ++futile;

@@ -19,8 +19,9 @@ struct GainSampling {
   int columns = 44;  ///< 1.3 degrees for a Kinect: a 5 cm voxel is met out to 2.2 m, and the reach zone ends before
   int rows = 33;
   int cluster_voxels_min =
-      8;               ///< unknown voxels in smaller clusters count nothing: rays see them everywhere along edges
-  int futile_max = 1;  ///< looks without result after which a voxel is taken to be solid or to give no return
+      8;                     ///< unknown voxels in smaller clusters count nothing: rays see them everywhere along edges
+  int again_futile_max = 2;  ///< the same for a free voxel that motion cannot use yet
+  int futile_max = 1;        ///< looks without result after which a voxel is taken to be solid or to give no return
 };
 
 /// Counts, for each voxel, looks that should have told something about it and did not (no return, grazing, dark
@@ -86,6 +87,8 @@ class GainModel {
   std::size_t remember_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker);
 
   [[nodiscard]] const FutileLooks& futile() const { return futile_; }
+  /// Every look may tell something again: what was known is no longer.
+  void forget_futile() { futile_.clear(); }
   [[nodiscard]] const DepthSensor& sensor() const { return sensor_; }
   [[nodiscard]] const GainSampling& sampling() const { return sampling_; }
   [[nodiscard]] GainWorker worker() const { return {geometry_, rays_.ends_m.size()}; }

@@ -159,7 +159,8 @@ bool CellQueue::put_away(const CellRecord& cell, const fs::path& folder) const {
   fs::remove_all(place, error);
   if (notable(cell)) {
     fs::create_directories(kept, error);
-    const auto there = std::distance(fs::directory_iterator(kept, error), fs::directory_iterator());
+    int there = 0;
+    for (fs::directory_iterator entry(kept, error), end; !error && entry != end; entry.increment(error)) ++there;
     if (!error && there < options_.kept_max) fs::rename(folder, place, error);
     if (!error && there < options_.kept_max) return true;
   }

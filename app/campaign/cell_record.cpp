@@ -1,5 +1,7 @@
 #include "app/campaign/cell_record.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -52,7 +54,7 @@ Json figures_json(const CellFigures& figures, const Columns& columns) {
 
 template <typename Columns>
 void read_figures(const Json& json, const Columns& columns, CellFigures& figures) {
-  for (const FigureColumn& column : columns) figures.*column.value = number_at(json, "/" + std::string(column.name));
+  for (const FigureColumn& column : columns) figures.*column.value = number_at(json, fmt::format("/{}", column.name));
 }
 
 bool is_whole_number(const Json& json, const char* key) {

@@ -111,9 +111,14 @@ Result<StateText> parse_state(std::string_view text, std::string_view name) {
       whole = cell.has_value();
       if (whole) state.cells.push_back(std::move(*cell));
     }
-    if (!whole && !last) {
-      return failure(Fault::kDataMalformed, "{}:{}: not the line of {}; remove it, and a cell runs again", name,
-                     line_number, line_number == 1 ? "a campaign" : "a cell");
+    if (!whole && (!last || end != std::string_view::npos)) {
+      return line_number == 1
+                 ? failure(
+                       Fault::kDataMalformed,
+                       "{}:1: not the first line of a campaign of this version; take another --out, or move it away",
+                       name)
+                 : failure(Fault::kDataMalformed, "{}:{}: not the line of a cell; remove it, and a cell runs again",
+                           name, line_number);
     }
     state.torn = !whole;
     if (!whole) break;
@@ -139,8 +144,11 @@ Result<FinishedCells> read_finished_cells(const fs::path& folder, const Campaign
       }
       const auto [known, added] = by_index.emplace(cell.index, cell);
       if (!added && !agree(known->second, cell)) {
-        return failure(Fault::kOutputNotEmpty, "{}: cell {} has another result than in an earlier file",
-                       (folder / name).string(), cell.index);
+        return failure(
+            Fault::kOutputNotEmpty,
+            "{}: cell {} has another result than in the files before it, though program and configuration are "
+            "the same: one of two computers is wrong. Remove the cell's line in one of them",
+            (folder / name).string(), cell.index);
       }
     }
   }
@@ -150,10 +158,10 @@ Result<FinishedCells> read_finished_cells(const fs::path& folder, const Campaign
 
 Result<StateFile> StateFile::open(const fs::path& folder, const Shard& shard, const CampaignIdentity& identity) {
   const std::string own = state_file_name(shard);
-  const auto names = state_files(folder);
-  if (!names) return std::unexpected(names.error());
   Result<AppendFile> file = AppendFile::open((folder / own).string());
   if (!file) return std::unexpected(file.error());
+  const auto names = state_files(folder);  // with the lock held: of two that start together one sees the other
+  if (!names) return std::unexpected(names.error());
   for (const std::string& name : *names) {
     if (name != own && may_overlap(name, shard) && is_being_appended((folder / name).string())) {
       return failure(Fault::kOutputNotEmpty, "{}: its cells run now, and may be the same; wait for their end",

@@ -75,7 +75,8 @@ CellRates rates_per_minute(const std::vector<CellRecord>& cells) {
 
 int CampaignCells::broken() const {
   return static_cast<int>(std::ranges::count_if(finished, [](const CellRecord& cell) {
-    return cell.touched() || !ended_safely(cell.outcome) || cell.reason.empty();
+    return cell.touched() || !ended_safely(cell.outcome) || cell.reason.empty() ||
+           cell.figures.loop_allocations.value_or(0) > 0;
   }));
 }
 

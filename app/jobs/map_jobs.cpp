@@ -41,7 +41,7 @@ IntegrateResult Workbench::integrate(const IntegrateArguments& arguments) {
   result.occupied = counts.occupied;
   result.gained = unknown_before_ > counts.unknown ? unknown_before_ - counts.unknown : 0;
   unknown_before_ = counts.unknown;
-  if (arguments.at_view) chooser_.remember_look(context(clearance_in_force_), arguments.frame.at_rad);
+  if (arguments.at_view && result.used) chooser_.remember_look(context(clearance_in_force_), arguments.frame.at_rad);
   note_frame(arguments, counts);
   return result;
 }

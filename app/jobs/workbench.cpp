@@ -341,6 +341,7 @@ void Workbench::publish_blind(double now_s, MotionPhase phase) {
 
 void Workbench::forget_known_free() {
   map_.forget_known_free();
+  chooser_.gain().forget_futile();
   rebuild_free_space(last_stamp_s_);
 }
 

@@ -146,7 +146,7 @@ class DepthFrame {
 
   [[nodiscard]] std::uint16_t measure(int c, int r) const {
     const std::size_t i = rays_.index(c, r);
-    if (strength_[i] <= 0) return 0;
+    if (strength_[i] <= 0 || !(depth_[i] > 0)) return 0;
     const std::uint64_t bits = noise_.bits(i);
     const float fate = uniform_of(bits, 2), share = uniform_of(bits, 3);
     if (fate >= strength_[i] * static_cast<float>(1 - sensor_.dropped)) return 0;

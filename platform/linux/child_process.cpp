@@ -24,6 +24,14 @@ constexpr std::size_t kBytesPerMaxrss = 1024;  // getrusage(2): kilobytes
 /// Closed at the end of its life.
 struct Descriptor {
   int value = -1;
+  /// Off the three standard streams, which the child will have under these numbers.
+  bool lift() {
+    if (value > STDERR_FILENO) return true;
+    const int lifted = fcntl(value, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+    close_now();
+    value = lifted;
+    return lifted >= 0;
+  }
   ~Descriptor() { close_now(); }
   void close_now() {
     if (value >= 0) ::close(value);
@@ -80,6 +88,11 @@ Result<ChildProcess> ChildProcess::start(const ChildCommand& command) {
     return failure(Fault::kOutOfMemory, "no pipe to a new process: {}", std::strerror(errno));
   }
   Descriptor reading{ends[0]}, writing{ends[1]};
+  if (!console.lift() || !nothing.lift() || !writing.lift()) {
+    return failure(Fault::kOutOfMemory, "no descriptor for a new process: {}", std::strerror(errno));
+  }
+  // Whoever started us may have it ignored, and then nobody would be told how a child ended.
+  std::signal(SIGCHLD, SIG_DFL);
 
   std::string name = "firstlook";
   std::vector<std::string> texts = command.arguments;
@@ -134,7 +147,9 @@ std::optional<ChildEnd> ChildProcess::ended() {
   if (end_ || pid_ < 0) return end_;
   int status = 0;
   rusage usage{};
-  if (wait4(pid_, &status, WNOHANG, &usage) == pid_) end_ = end_of(status, usage);
+  const pid_t found = wait4(pid_, &status, WNOHANG, &usage);
+  if (found == pid_) end_ = end_of(status, usage);
+  if (found < 0 && errno == ECHILD) end_ = ChildEnd{.exit_code = kEndNotSeen};
   return end_;
 }
 

@@ -22,6 +22,8 @@ struct ChildCommand {
   std::string console;                 ///< file that takes stdout and stderr, made anew; stdin is empty
 };
 
+inline constexpr int kEndNotSeen = 126;  ///< exit code of a child that somebody else has waited for
+
 struct ChildEnd {
   int exit_code = 0;
   int signal = 0;                       ///< that ended it; 0: it ended by itself

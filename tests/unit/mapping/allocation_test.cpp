@@ -124,9 +124,8 @@ TEST_CASE("colours and sensors of a frame are noted without an allocation", "[ma
     const Transform<Base, Depth> pose = random_pose(random);
     const DepthImage depth{{values.data(), kWidth, kHeight}, 1000};
     REQUIRE(inserter.insert(map, depth, pose, self_m, frame));
-    std::uint32_t colored = 0;
     const std::uint64_t allocations = allocations_of([&] {
-      colored =
+      colored +=
           registration.add(*planes.color, depth, pose, self_m, {camera, {}}, {colors.data(), 80, 60}, inserter.hit());
       planes.sensor->note(inserter.missed(), inserter.hit(), 1);
     });
