@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <system_error>
 
@@ -18,6 +19,8 @@
 #include "app/shell/job_settings.hpp"
 #include "app/shell/replay.hpp"
 #include "hal/sim/simulated_cell.hpp"
+#include "hal/sim/ur_controller/tcp_service.hpp"
+#include "platform/linux/files.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/terminal.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -290,6 +293,22 @@ int run_job(const RunCommand& command) {
   return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());
 }
 
+int run_ur_sim(const UrSimCommand& command) {
+  const auto identity = sim::ur::identify_controller(command.model, command.seed, command.serial);
+  if (!identity) return fail(identity.error());
+  sim::ur::SimulatedUrOptions options;
+  options.running = command.running;
+  for (const std::string& path : command.programs) {
+    const Result<std::string> script = read_text_file(path, sim::ur::kScriptBytesMax);
+    if (!script) return fail(script.error());
+    options.programs.push_back({std::filesystem::path(path).stem().string() + ".urp", *script});
+  }
+  sim::ur::SimulatedUr robot(*identity, options);
+  catch_stop_signals();
+  const Status served = sim::ur::serve_on_tcp(robot, {command.host, command.port_offset});
+  return served ? kDone : fail(served.error());
+}
+
 /// Data that nobody received must not look like success: a full disk shows itself only here.
 bool flush_stdout() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return true;
@@ -304,6 +323,7 @@ struct Dispatch {
   int operator()(const MapCommandOptions& c) const { return run_map_command(c); }
   int operator()(const ExportCommandOptions& c) const { return run_export_command(c); }
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
+  int operator()(const UrSimCommand& c) const { return run_ur_sim(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);
