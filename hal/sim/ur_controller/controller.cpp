@@ -8,6 +8,9 @@ namespace {
 
 // Clients take a controller whose clock is younger than 40 s for one that still boots.
 constexpr double kStartedBefore_s = 60;
+// Folded over the base, away from singularities and limits: where UR's own simulator starts, too.
+const JointVector kStart_rad = {-1.6007, -1.7271, -2.203, -0.808, 1.5951, -0.031};
+
 constexpr double kPowerOn_s = 1.0;
 constexpr double kReleaseBrakes_s = 0.5;
 constexpr double kInspect_s = 5;  // of a protective stop, before it can be unlocked
@@ -23,8 +26,7 @@ Vector6 vector_of_joints(const JointVector& q) {
 
 }  // namespace
 
-Controller::Controller(const ControllerIdentity& identity)
-    : identity_(identity), motion_(identity_.arm, default_start(identity_.nominal)) {
+Controller::Controller(const ControllerIdentity& identity) : identity_(identity), motion_(identity_.arm, kStart_rad) {
   state_.timestamp_s = kStartedBefore_s;
   report_arm();
 }

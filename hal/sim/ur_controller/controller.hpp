@@ -13,7 +13,7 @@ namespace firstlook::sim::ur {
 
 class Controller {
  public:
-  /// Switched on, arm without power, at `default_start` of its model.
+  /// Switched on, arm without power, in a pose from which it can move to all sides.
   explicit Controller(const ControllerIdentity& identity);
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;

@@ -1,14 +1,94 @@
 #include "hal/sim/ur_controller/programs.hpp"
 
+#include "hal/sim/ur_controller/script/compiler.hpp"
+
 namespace firstlook::sim::ur {
 namespace {
+
 constexpr std::string_view kFolder = "/programs/";
-}
+constexpr std::size_t kSecondaryMax = 8;  // programs beside the running one, at once
+
+using Kind = ControllerEvent::Kind;
+
+}  // namespace
 
 Programs::Programs(Controller& controller, std::vector<StoredProgram> stored)
     : controller_(controller), stored_(std::move(stored)) {}
 
-void Programs::step() {}
+void Programs::set_sockets(script::Sockets* sockets) {
+  end_program();
+  pending_.reset();
+  secondary_.clear();
+  sockets_ = sockets;
+}
+
+void Programs::tell_error(const script::ScriptError& error) {
+  controller_.tell({.kind = Kind::kRuntimeException, .code = error.line, .argument = error.column, .text = error.text});
+}
+
+void Programs::end_program() {
+  if (program_ == nullptr) return;
+  if (program_->error()) tell_error(*program_->error());
+  controller_.tell({.kind = Kind::kKey, .title = "PROGRAM_XXX_STOPPED", .text = program_->code().name});
+  program_.reset();
+  controller_.set_script_line(0);
+}
+
+void Programs::begin_pending() {
+  program_ = std::move(pending_);
+  controller_.play();
+  controller_.tell({.kind = Kind::kKey, .title = "PROGRAM_XXX_STARTED", .text = program_->code().name});
+}
+
+void Programs::step() {
+  const RuntimeState runtime = controller_.state().runtime;
+  if (runtime == RuntimeState::kStopping || runtime == RuntimeState::kStopped) end_program();
+  if (pending_ != nullptr && program_ == nullptr && runtime == RuntimeState::kStopped) {
+    if (controller_.can_play()) {
+      begin_pending();
+    } else {
+      pending_.reset();
+    }
+  }
+  if (program_ != nullptr && controller_.playing()) {
+    program_->step();
+    if (program_->end()) {
+      end_program();
+      controller_.stop();
+    }
+  }
+  for (const auto& secondary : secondary_) {
+    secondary->step();
+    if (secondary->error()) tell_error(*secondary->error());
+  }
+  std::erase_if(secondary_, [](const auto& secondary) { return secondary->end().has_value(); });
+}
+
+bool Programs::start(const std::string& script) {
+  auto code = script::compile(script);
+  if (!code) {
+    tell_error(code.error());
+    return false;
+  }
+  const bool secondary = code->secondary;
+  auto machine = std::make_unique<script::Machine>(std::move(*code), controller_, sockets_);
+  if (secondary) {
+    if (secondary_.size() < kSecondaryMax) secondary_.push_back(std::move(machine));
+    return true;
+  }
+  pending_ = std::move(machine);
+  controller_.stop();
+  return true;
+}
+
+void Programs::submit(const std::string& script) {
+  if (start(script) && pending_ != nullptr && !controller_.can_play()) {
+    pending_.reset();
+    controller_.tell({.kind = Kind::kErrorCode,
+                      .warning = true,
+                      .text = "The program is not started: the robot is not running, or stopped for safety"});
+  }
+}
 
 bool Programs::load(std::string_view name) {
   if (name.starts_with(kFolder)) name.remove_prefix(kFolder.size());
@@ -23,11 +103,17 @@ bool Programs::load(std::string_view name) {
 
 bool Programs::play() {
   if (!controller_.can_play()) return false;
-  const RuntimeState runtime = controller_.state().runtime;
-  const bool paused = runtime == RuntimeState::kPaused || runtime == RuntimeState::kPausing;
-  if (!paused && loaded_ == nullptr) return false;
-  controller_.play();
-  return true;
+  switch (controller_.state().runtime) {
+    case RuntimeState::kPaused:
+    case RuntimeState::kPausing:
+      controller_.play();
+      return true;
+    case RuntimeState::kStopped:
+    case RuntimeState::kStopping:
+      return loaded_ != nullptr && start(loaded_->script);
+    default:
+      return true;  // it plays
+  }
 }
 
 bool Programs::pause() {
@@ -37,13 +123,10 @@ bool Programs::pause() {
 }
 
 bool Programs::stop() {
-  if (!controller_.state().program_running()) return false;
+  const bool running = controller_.state().program_running() || pending_ != nullptr;
+  pending_.reset();
   controller_.stop();
-  return true;
-}
-
-void Programs::submit(const std::string& script) {
-  controller_.tell({.kind = ControllerEvent::Kind::kText, .text = "no interpreter: " + script.substr(0, 80)});
+  return running;
 }
 
 std::string Programs::loaded_path() const {

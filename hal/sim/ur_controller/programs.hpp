@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/sim/ur_controller/controller.hpp"
+#include "hal/sim/ur_controller/script/machine.hpp"
 
 namespace firstlook::sim::ur {
 
@@ -21,6 +22,9 @@ class Programs {
   /// The controller must outlive this.
   Programs(Controller& controller, std::vector<StoredProgram> stored);
 
+  /// How scripts reach other computers; null: not at all. Must outlive this, or be set to null again.
+  void set_sockets(script::Sockets* sockets);
+
   /// One control cycle, after the controller's.
   void step();
 
@@ -30,7 +34,8 @@ class Programs {
   [[nodiscard]] bool pause();
   [[nodiscard]] bool stop();
 
-  /// URScript that came over a script port: it replaces what runs; a `sec` runs beside it.
+  /// URScript that came over a script port: it replaces what runs; a `sec` runs beside it. What does not compile leaves
+  /// the running program alone and is told as a runtime exception.
   void submit(const std::string& script);
 
   /// "/programs/cart.urp", empty when nothing is loaded.
@@ -39,9 +44,18 @@ class Programs {
   [[nodiscard]] std::string_view loaded_name() const;
 
  private:
+  [[nodiscard]] bool start(const std::string& script);
+  void begin_pending();
+  void end_program();
+  void tell_error(const script::ScriptError& error);
+
   Controller& controller_;
   std::vector<StoredProgram> stored_;
+  script::Sockets* sockets_ = nullptr;
   const StoredProgram* loaded_ = nullptr;
+  std::unique_ptr<script::Machine> program_;
+  std::unique_ptr<script::Machine> pending_;  ///< begins when the arm stands
+  std::vector<std::unique_ptr<script::Machine>> secondary_;
 };
 
 }  // namespace firstlook::sim::ur

@@ -13,9 +13,12 @@ namespace {
 constexpr std::size_t kUnreadMax = 2 << 20;
 constexpr std::int64_t kLateMax_ns = 500'000'000;  // after a longer sleep the cycles in between are left out
 
-class TcpService final : public TcpEvents {
+class TcpService final : public TcpEvents, public script::Sockets {
  public:
-  explicit TcpService(SimulatedUr& robot) : robot_(robot) {}
+  explicit TcpService(SimulatedUr& robot) : robot_(robot) { robot_.programs().set_sockets(this); }
+  ~TcpService() override { robot_.programs().set_sockets(nullptr); }
+  TcpService(const TcpService&) = delete;
+  TcpService& operator=(const TcpService&) = delete;
 
   [[nodiscard]] Status listen(const TcpServiceOptions& options) {
     for (const Port port : kPorts) {
@@ -42,21 +45,66 @@ class TcpService final : public TcpEvents {
     }
   }
 
-  void opened(TcpId connection, TcpId listener) override { sessions_[connection] = &robot_.open(ports_.at(listener)); }
+  void opened(TcpId connection, TcpId listener) override {
+    if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
+      dialled->second.state = State::kOpen;
+    } else {
+      sessions_[connection] = &robot_.open(ports_.at(listener));
+    }
+  }
 
   void received(TcpId connection, std::string_view bytes) override {
+    if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
+      std::string& waiting = dialled->second.received;
+      waiting.append(bytes);
+      if (waiting.size() > kUnreadMax) tcp_.close(connection), dialled->second.state = State::kClosed;
+      return;
+    }
     const auto found = sessions_.find(connection);
     if (found != sessions_.end() && !found->second->over()) found->second->receive(bytes);
   }
 
   void closed(TcpId connection) override {
+    if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
+      dialled->second.state = State::kClosed;  // what came before can still be read
+      return;
+    }
     const auto found = sessions_.find(connection);
     if (found == sessions_.end()) return;
     robot_.close(*found->second);
     sessions_.erase(found);
   }
 
+  // The connections of scripts.
+  Id open(const std::string& host, std::uint16_t port) override {
+    const Result<TcpId> connection = tcp_.dial(host, port);
+    if (!connection) return 0;
+    dialled_[*connection] = {};
+    return *connection;
+  }
+  State state(Id socket) const override {
+    const auto found = dialled_.find(socket);
+    return found == dialled_.end() ? State::kClosed : found->second.state;
+  }
+  bool send(Id socket, std::string_view bytes) override {
+    const auto found = dialled_.find(socket);
+    if (found == dialled_.end() || found->second.state != State::kOpen) return false;
+    std::string& unsent = found->second.unsent;
+    unsent.append(bytes);
+    return tcp_.send(socket, unsent) && unsent.size() <= kUnreadMax;
+  }
+  std::string& received(Id socket) override { return dialled_[socket].received; }
+  void close(Id socket) override {
+    tcp_.close(socket);
+    dialled_.erase(socket);
+  }
+
  private:
+  struct Dialled {
+    State state = State::kConnecting;
+    std::string received, unsent;
+  };
+
   /// A client that asked for the shutdown has its answer first.
   [[nodiscard]] bool finished() const { return robot_.shutting_down() && waiting_.empty(); }
 
@@ -72,6 +120,11 @@ class TcpService final : public TcpEvents {
         waiting_.push_back(connection);
       }
     }
+    for (auto& [connection, dialled] : dialled_) {
+      if (dialled.state != State::kOpen || dialled.unsent.empty()) continue;
+      static_cast<void>(tcp_.send(connection, dialled.unsent));
+      if (!dialled.unsent.empty()) waiting_.push_back(connection);
+    }
     for (const TcpId connection : done) {
       tcp_.close(connection);
       closed(connection);
@@ -82,7 +135,8 @@ class TcpService final : public TcpEvents {
   Tcp tcp_;
   std::map<TcpId, Port> ports_;
   std::map<TcpId, Session*> sessions_;
-  std::vector<TcpId> waiting_;  ///< connections with something to send
+  std::map<TcpId, Dialled> dialled_;  ///< by scripts
+  std::vector<TcpId> waiting_;        ///< connections with something to send
 };
 
 }  // namespace
