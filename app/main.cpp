@@ -306,7 +306,12 @@ int run_ur_sim(const UrSimCommand& command) {
   sim::ur::SimulatedUr robot(*identity, options);
   catch_stop_signals();
   const Status served = sim::ur::serve_on_tcp(robot, {command.host, command.port_offset});
-  return served ? kDone : fail(served.error());
+  if (served) return kDone;
+  std::fprintf(stderr,
+               "firstlook: E%d %s\n  What to do: end the program that has the port, or choose another --port-offset or "
+               "--host; ports below 1024 need root.\n",
+               static_cast<int>(served.error().fault), std::string(served.error().detail()).c_str());
+  return exit_code_of(served.error());
 }
 
 /// Data that nobody received must not look like success: a full disk shows itself only here.

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kSwitch_rad_s2 = 10;  // brakes what moves before a path begins
 constexpr double kAcceleration_rad_s2 = 40;
+constexpr double kAccelerationMin = 0.01;  // of speedj and speedl
 
 /// The arm is this thread's and stands; false while it does not, or when it is another's.
 bool arm_ready(Call& c) {
@@ -72,19 +73,29 @@ void movej(Call& c) {
   c.wait();
 }
 
-void movel(Call& c) {
-  CallState& state = c.state();
-  if (state.phase == 1) return follow(c);
-  const double acceleration = c.number(1), speed = c.number(2), time_s = c.number(3);
+/// The tool straight to the pose of argument `i`; joints stand for the pose that they reach.
+void begin_line(Call& c, std::size_t i, double speed, double acceleration, double time_s) {
   check_limits(c, speed, acceleration, time_s);
   if (!arm_ready(c)) return;
-  // Joints stand for the pose that they reach.
-  const Pose base_T_tcp = c.value(0).as<List>() != nullptr ? c.controller().tcp_pose(c.joints(0)) : c.pose(0);
+  const Pose base_T_tcp = c.value(i).as<List>() != nullptr ? c.controller().tcp_pose(c.joints(i)) : c.pose(i);
   if (!c.ok()) return;
   const Pose base_T_flange = base_T_tcp * c.controller().flange_T_tcp().inverse(Eigen::Isometry);
-  state.ticket = c.controller().motion().movel(base_T_flange, std::max(speed, 1e-6), acceleration, time_s);
-  state.phase = 1;
+  c.state().ticket = c.controller().motion().movel(base_T_flange, std::max(speed, 1e-6), acceleration, time_s);
+  ++c.state().phase;
   c.wait();
+}
+
+void movel(Call& c) {
+  if (c.state().phase == 1) return follow(c);
+  begin_line(c, 0, c.number(2), c.number(1), c.number(3));
+}
+
+/// By way of the first pose to the second, on two lines instead of an arc.
+void movec(Call& c) {
+  CallState& state = c.state();
+  if (state.phase == 2) return follow(c);
+  if (state.phase == 1 && !c.controller().motion().done(state.ticket)) return c.wait();
+  begin_line(c, state.phase == 0 ? 0 : 1, c.number(3), c.number(2), 0);
 }
 
 /// servoj, speedj and speedl: the arm stays with the thread until it does something else.
@@ -112,8 +123,8 @@ void servoc_pose(Call& c) {
 
 void speedj(Call& c) {
   const JointVector speed_rad_s = c.joints(0);
-  const double acceleration = c.number(1), time_s = c.number(2);
-  check_limits(c, 1, acceleration, 0);
+  // No change of speed in a step is an acceleration of 0 to some scripts.
+  const double acceleration = std::max(c.number(1), kAccelerationMin), time_s = c.number(2);
   if (!streaming_ready(c)) return;
   if (c.state().first) c.controller().motion().speedj(speed_rad_s, std::min(acceleration, kAcceleration_rad_s2));
   // Without a time it returns when the speed is reached.
@@ -123,8 +134,8 @@ void speedj(Call& c) {
 
 void speedl(Call& c) {
   const Vector6 twist = c.six(0);
-  const double acceleration = c.number(1), time_s = c.number(2);
-  check_limits(c, 1, acceleration, 0);
+  // No change of speed in a step is an acceleration of 0 to some scripts.
+  const double acceleration = std::max(c.number(1), kAccelerationMin), time_s = c.number(2);
   if (!streaming_ready(c)) return;
   if (c.state().first) {
     // The flange turns with the tool and moves so that the tool's centre has the speed.
@@ -148,12 +159,15 @@ void stop_arm(Call& c) {
 void nothing(Call&) {}
 
 constexpr Builtin kTable[] = {
+    {"enable_external_ft_sensor", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
     {"end_force_mode", "", nothing},
     {"end_freedrive_mode", "", nothing},
     {"force_mode", "task_frame,selection_vector,wrench,type,limits", nothing},
     {"force_mode_set_damping", "damping", nothing},
     {"force_mode_set_gain_scaling", "scaling", nothing},
     {"freedrive_mode", "freeAxes=[],feature=[]", nothing},
+    {"ft_rtde_input_enable", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
+    {"movec", "pose_via,pose_to,a=1.2,v=0.25,r=0,mode=0", movec},
     {"movej", "q,a=1.4,v=1.05,t=0,r=0", movej},
     {"movel", "pose,a=1.2,v=0.25,t=0,r=0", movel},
     {"movep", "pose,a=1.2,v=0.25,t=0,r=0", movel},
@@ -161,8 +175,11 @@ constexpr Builtin kTable[] = {
     {"servoj", "q,a=0,v=0,t=0,lookahead_time=0.1,gain=300", servoj},
     {"speedj", "qd,a=1.4,t=0", speedj},
     {"speedl", "xd,a=1.2,t=0,aRot=0", speedl},
+    {"end_teach_mode", "", nothing},
     {"stopj", "a=2", stop_arm},
     {"stopl", "a=2,aRot=0", stop_arm},
+    {"teach_mode", "", nothing},
+    {"tool_contact", "direction=[]", [](Call& c) { c.answer(std::int64_t{0}); }},
     {"zero_ftsensor", "", nothing},
 };
 

@@ -100,6 +100,8 @@ constexpr Builtin kTable[] = {
     {"get_inverse_kin", "x,qnear=[],maxPositionError=1e-10,maxOrientationError=1e-10,tcp=\"active\"", inverse_kin},
     {"get_inverse_kin_has_solution", "x,qnear=[],maxPositionError=1e-10,maxOrientationError=1e-10,tcp=\"active\"",
      inverse_kin_exists},
+    {"get_joint_positions", "", joint_positions},
+    {"get_joint_speeds", "", joint_speeds},
     {"get_joint_temp", "j", joint_temperature},
     {"get_joint_torques", "", [](Call& c) { c.answer(list_of(joint_moments_nm(c.robot()))); }},
     {"get_steptime", "", [](Call& c) { c.answer(c.machine().cycle_s()); }},

@@ -24,6 +24,7 @@ enum class Op : std::uint8_t {
   kJumpIfFalse,      ///< pops
   kJumpIfFalseKeep,  ///< of `and`: leaves the value when it jumps
   kJumpIfTrueKeep,   ///< of `or`
+  kJumpIfSet,        ///< to a, when local b has a value
   kPop,
   kMakeList,     ///< of a values
   kMakePose,     ///< of six

@@ -115,7 +115,10 @@ class Compiler {
         functions.push_back(opens_function(token.text));
         if (functions.back()) {
           const bool program = first && !token.is("thread");
-          if (!program) function_numbers_.emplace(tokens_[i + 1].text, -1);
+          if (!program) {
+            function_numbers_.emplace(tokens_[i + 1].text, -1);
+            parameters_[tokens_[i + 1].text] = parameters_at(i + 2);
+          }
           if (program) program_depth_ = 1;
           ++depth;
         }
@@ -130,6 +133,18 @@ class Compiler {
       }
       first = first && token.kind == Kind::kLineEnd;
     }
+  }
+  /// The names between the brackets of a function's head.
+  [[nodiscard]] std::vector<std::string> parameters_at(std::size_t i) const {
+    std::vector<std::string> names;
+    int depth = 0;
+    for (; i < tokens_.size() && tokens_[i].kind != Kind::kLineEnd; ++i) {
+      depth += tokens_[i].is("(") || tokens_[i].is("[") ? 1 : tokens_[i].is(")") || tokens_[i].is("]") ? -1 : 0;
+      const bool begins = depth == 1 && (tokens_[i - 1].is("(") || tokens_[i - 1].is(","));
+      if (begins && tokens_[i].kind == Kind::kName) names.push_back(tokens_[i].text);
+      if (depth == 0) break;
+    }
+    return names;
   }
   [[nodiscard]] bool assigns(std::size_t i) const {
     std::size_t j = i + 1;
@@ -204,8 +219,9 @@ class Compiler {
     scopes_.back().function.thread = thread;
     expect("(");
     while (!error_ && !now().is(")")) {
-      static_cast<void>(declare_local(expect_name()));
+      const int local = declare_local(expect_name());
       ++scopes_.back().function.parameters;
+      if (accept("=")) default_value(local);
       if (!accept(",")) break;
     }
     expect(")");
@@ -214,6 +230,14 @@ class Compiler {
     expect("end");
     if (!error_) expect_line_end();
     return end_function();
+  }
+
+  /// Evaluated in the function, when the caller gave nothing.
+  void default_value(int local) {
+    const int given = emit(Op::kJumpIfSet, 0, local);
+    expression();
+    emit(Op::kStoreLocal, local);
+    aim(given);
   }
 
   // --- statements ---
@@ -324,6 +348,8 @@ class Compiler {
     if (global || local) advance();
     if (now().kind == Kind::kName && assigns(at_)) {
       assignment(global, local);
+    } else if (global && now().kind == Kind::kName) {
+      advance();  // a declaration alone
     } else if (global || local) {
       fail_here();
     } else {
@@ -578,20 +604,21 @@ class Compiler {
   }
 
   void call_function(const Token& name) {
-    int count = 0;
-    while (!error_ && !now().is(")")) {
-      expression();
-      ++count;
-      if (!accept(",")) break;
-    }
-    expect(")");
-    emit_at(name, Op::kCall, function_number(name.text, false), count);
+    std::vector<Parameter> parameters;
+    for (const std::string& parameter : parameters_[name.text]) parameters.push_back({parameter, true, {}});
+    arguments(name, parameters);
+    emit_at(name, Op::kCall, function_number(name.text, false), static_cast<int>(parameters.size()));
   }
 
-  /// Arguments by position, then by name, then the defaults: evaluated as written, pushed in the builtin's order.
   void call_builtin(const Token& name, int builtin) {
     const std::vector<Parameter> parameters = parameters_of(builtin);
-    std::vector<std::vector<Instruction>> arguments(parameters.size());
+    arguments(name, parameters);
+    emit_at(name, Op::kCallBuiltin, builtin, static_cast<int>(parameters.size()));
+  }
+
+  /// Arguments by position or by name, and the defaults of the others, pushed in the order of the parameters.
+  void arguments(const Token& name, const std::vector<Parameter>& parameters) {
+    std::vector<std::vector<Instruction>> given(parameters.size());
     std::size_t position = 0;
     while (!error_ && !now().is(")")) {
       std::size_t index = position++;
@@ -601,25 +628,25 @@ class Compiler {
         advance();
         advance();
       }
-      if (index >= parameters.size() || !arguments[index].empty()) {
-        return fail({name.line, name.column, fmt::format("compile_error_wrong_arguments:{}:", name.text)});
-      }
-      arguments[index] = apart([this] { expression(); });
+      if (index >= parameters.size() || !given[index].empty()) return fail_arguments(name);
+      given[index] = apart([this] { expression(); });
       if (!accept(",")) break;
     }
     expect(")");
     if (error_) return;
     for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (!arguments[i].empty()) {
-        append(arguments[i]);
+      if (!given[i].empty()) {
+        append(given[i]);
       } else if (parameters[i].has_default) {
         code_.constants.push_back(parameters[i].default_value);
         emit_at(name, Op::kConstant, static_cast<int>(code_.constants.size()) - 1);
       } else {
-        return fail({name.line, name.column, fmt::format("compile_error_wrong_arguments:{}:", name.text)});
+        return fail_arguments(name);
       }
     }
-    emit_at(name, Op::kCallBuiltin, builtin, static_cast<int>(parameters.size()));
+  }
+  void fail_arguments(const Token& name) {
+    fail({name.line, name.column, fmt::format("compile_error_wrong_arguments:{}:", name.text)});
   }
 
   /// Code that is moved to its place later: jumps in it are relative to its begin.
@@ -649,7 +676,8 @@ class Compiler {
   std::optional<ScriptError> error_;
   Code code_;
   std::vector<Scope> scopes_;
-  std::map<std::string, int> function_numbers_;  ///< -1: not yet met
+  std::map<std::string, int> function_numbers_;                 ///< -1: not yet met
+  std::map<std::string, std::vector<std::string>> parameters_;  ///< of each function
   std::map<std::string, int> global_numbers_;
   int program_depth_ = 0;  ///< 1 where a `def` or `sec` holds everything
   int nesting_ = 0;

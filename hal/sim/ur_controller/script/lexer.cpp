@@ -31,7 +31,16 @@ class Lexer {
   [[nodiscard]] int column() const { return static_cast<int>(at_ - line_begin_) + 1; }
   void push(Token::Kind kind, std::string_view text) { tokens_.push_back({kind, std::string(text), line_, column()}); }
   void end_line() {
-    if (!tokens_.empty() && tokens_.back().kind != Token::Kind::kLineEnd) push(Token::Kind::kLineEnd, "");
+    if (!tokens_.empty() && tokens_.back().kind != Token::Kind::kLineEnd && !goes_on(tokens_.back())) {
+      push(Token::Kind::kLineEnd, "");
+    }
+  }
+  /// A line that ends in an operator is continued on the next one.
+  [[nodiscard]] static bool goes_on(const Token& last) {
+    constexpr std::array<std::string_view, 15> kOperators = {"or", "and", "xor", "not", "+",  "-", "*", "/",
+                                                             "%",  "==",  "!=",  "<=",  ">=", "<", ">"};
+    return (last.kind == Token::Kind::kName || last.kind == Token::Kind::kSymbol) &&
+           std::ranges::find(kOperators, last.text) != kOperators.end();
   }
 
   bool next() {

@@ -26,7 +26,8 @@ struct Token {
   }
 };
 
-/// Line ends within brackets and comments are left out; several line ends are one. The last token is kEnd.
+/// Line ends within brackets and after operators are left out, and comments; several line ends are one. The last token
+/// is kEnd.
 [[nodiscard]] std::expected<std::vector<Token>, ScriptError> tokenize(std::string_view script);
 
 /// "syntax_error_on_line:4:   the line:"

@@ -85,7 +85,7 @@ void Machine::step() {
   ++cycles_;
   // Threads that others start in this cycle run in it, too; references into the vector would not survive that.
   for (std::size_t i = 0; i < threads_.size() && !end_; ++i) {
-    if (critical_owner_ != 0 && critical_owner_ != threads_[i].number) continue;
+    if (excluded(threads_[i])) continue;
     Thread thread = std::move(threads_[i]);
     threads_[i].number = thread.number;
     threads_[i].frames = {Frame{}};  // it is alive for those who look
@@ -106,6 +106,14 @@ std::uint64_t Machine::held() const {
     for (const Value& value : thread.stack) sum += value.weight;
   }
   return sum;
+}
+
+/// A critical section keeps the others out while its thread computes, not while it waits: that would stop them for good
+/// where a loop enters it again at once.
+bool Machine::excluded(const Thread& thread) {
+  if (critical_owner_ == 0 || critical_owner_ == thread.number) return false;
+  const Thread* owner = find(critical_owner_);
+  return owner != nullptr && !owner->waiting;
 }
 
 void Machine::remove_ended() {
@@ -138,11 +146,6 @@ void Machine::run(Thread& thread) {
 
 bool Machine::execute_call(Thread& thread, const Instruction& instruction) {
   const Function& function = code_.functions[static_cast<std::size_t>(instruction.a)];
-  if (function.parameters != instruction.b) {
-    return fail(instruction,
-                fmt::format("{}: {} arguments instead of {}", function.name, instruction.b, function.parameters)),
-           false;
-  }
   if (thread.frames.size() >= kFramesMax || thread.stack.size() >= kStackMax) {
     return fail(instruction, "Stack overflow"), false;
   }
@@ -187,9 +190,9 @@ bool Machine::execute_thread_op(Thread& thread, const Instruction& instruction) 
     ++thread.frames.back().next;
     return true;
   }
+  // Scripts keep 0 in a variable for "no thread": nothing to join or kill.
   const auto* handle = thread.stack.back().as<ThreadHandle>();
-  if (handle == nullptr) return fail(instruction, "Type error: not a thread"), false;
-  const std::int64_t number = handle->number;
+  const std::int64_t number = handle != nullptr ? handle->number : 0;
   if (instruction.op == Op::kJoin && number != thread.number && find(number) != nullptr) {
     thread.waiting = true;
     return false;
@@ -227,6 +230,7 @@ bool Machine::execute(Thread& thread) {
   // A function without a value may be called, but not assigned or compared.
   const auto condition = [&](const Value& value) -> std::optional<bool> {
     if (const bool* flag = value.as<bool>()) return *flag;
+    if (value.is_number()) return value.number() != 0;
     fail(instruction, fmt::format("Type error: a condition is {}, not bool", type_name(value)));
     return std::nullopt;
   };
@@ -252,6 +256,9 @@ bool Machine::execute(Thread& thread) {
     case Op::kJump:
       // Backwards only from a loop's end.
       frame.next = a;
+      return true;
+    case Op::kJumpIfSet:
+      frame.next = stack[frame.base + static_cast<std::size_t>(instruction.b)].empty() ? frame.next + 1 : a;
       return true;
     case Op::kJumpIfFalse:
     case Op::kJumpIfFalseKeep:

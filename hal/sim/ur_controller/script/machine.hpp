@@ -78,6 +78,7 @@ class Machine {
   [[nodiscard]] bool execute_thread_op(Thread& thread, const Instruction& instruction);
   void fail(const Instruction& at, std::string text);
   [[nodiscard]] Thread* find(std::int64_t number);
+  [[nodiscard]] bool excluded(const Thread& thread);
   /// The weight of everything that it holds.
   [[nodiscard]] std::uint64_t held() const;
   void kill(std::int64_t number);

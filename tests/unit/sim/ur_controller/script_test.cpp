@@ -144,6 +144,68 @@ end
   CHECK(robot.state().runtime == RuntimeState::kStopped);
 }
 
+TEST_CASE("what scripts of known clients rely on", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def prog():
+  global mode = 0
+  def greet(name, times=2, mark="!"):
+    return str_cat(str_cat(name, times), mark)
+  end
+  def declares():
+    global mode
+    mode = 7
+  end
+  textmsg(greet("a"))
+  textmsg(greet("b", mark="?"))
+  textmsg(greet("c", 3))
+  declares()
+  thread_move = 0
+  join thread_move
+  kill thread_move
+  if mode == 8 or
+    mode == 7:
+    textmsg("continued")
+  end
+  if 1.0 and thread_move != 1:
+    textmsg("number")
+  end
+  def scale(p, factor):
+    p[0] = p[0] * factor
+    return p
+  end
+  textmsg(scale(p[1, 2, 3, 0, 0, 0], 2))
+  global served = 0
+  thread server():
+    while True:
+      enter_critical
+      q = get_joint_positions()
+      servoj(q, t=get_steptime(), lookahead_time=0.03, gain=2000)
+      served = served + 1
+      exit_critical
+    end
+  end
+  thread_move = run server()
+  i = 0
+  while i < 20:
+    enter_critical
+    i = i + 1
+    sync()
+    exit_critical
+  end
+  textmsg(served > 10)
+  kill thread_move
+  stopj(4.0)
+  speedj([0, 0, 0, 0, 0, 0], 0, get_steptime())
+  movec(pose_add(get_actual_tcp_pose(), p[0, 0.01, 0.01, 0, 0, 0]), pose_add(get_actual_tcp_pose(), p[0, 0.02, 0, 0, 0, 0]))
+  textmsg("end")
+end
+)",
+             2);
+  for (const auto& exception : robot.exceptions) CHECK(exception.text.empty());
+  CHECK(robot.texts ==
+        std::vector<std::string>{"a2!", "b2?", "c3!", "continued", "number", "p[2, 2, 3, 0, 0, 0]", "True", "end"});
+}
+
 TEST_CASE("threads run beside each other and end with the program", "[ur][script]") {
   ScriptRobot robot;
   robot.send(R"(def prog():
