@@ -112,6 +112,14 @@ void Tcp::close(TcpId connection) {
   entries_.erase(found);
 }
 
+void Tcp::abort(TcpId connection) {
+  const auto found = entries_.find(connection);
+  if (found == entries_.end()) return;
+  const linger at_once{1, 0};
+  setsockopt(found->second.descriptor, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+  close(connection);
+}
+
 void Tcp::accept_all(TcpId listener, int descriptor, TcpEvents& events) {
   for (;;) {
     const int accepted = accept4(descriptor, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);

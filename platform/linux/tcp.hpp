@@ -46,6 +46,8 @@ class Tcp {
   /// gone; `closed` follows for a broken one.
   bool send(TcpId connection, std::string& bytes);
   void close(TcpId connection);
+  /// The same without sending what the system still holds: for a peer that does not read.
+  void abort(TcpId connection);
 
   /// Waits for something to happen, until `monotonic_ns_until` at most (as monotonic_ns() counts) or a signal, then
   /// tells `events` all of it. `writable` names connections for which room to send counts, too.

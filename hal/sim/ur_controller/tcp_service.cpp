@@ -49,6 +49,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
     if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
       dialled->second.state = State::kOpen;
     } else {
+      session_ports_[connection] = ports_.at(listener);
       sessions_[connection] = &robot_.open(ports_.at(listener));
     }
   }
@@ -73,6 +74,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
     if (found == sessions_.end()) return;
     robot_.close(*found->second);
     sessions_.erase(found);
+    session_ports_.erase(connection);
   }
 
   // The connections of scripts.
@@ -110,11 +112,13 @@ class TcpService final : public TcpEvents, public script::Sockets {
 
   void flush() {
     waiting_.clear();
-    std::vector<TcpId> done;
+    std::vector<TcpId> done, dropped;
     for (const auto& [connection, session] : sessions_) {
       const bool alive = tcp_.send(connection, session->output());
       const bool all_sent = session->output().empty();
-      if (!alive || session->output().size() > kUnreadMax || (session->over() && all_sent)) {
+      if (session->output().size() > kUnreadMax) {
+        dropped.push_back(connection);
+      } else if (!alive || (session->over() && all_sent)) {
         done.push_back(connection);
       } else if (!all_sent) {
         waiting_.push_back(connection);
@@ -129,12 +133,19 @@ class TcpService final : public TcpEvents, public script::Sockets {
       tcp_.close(connection);
       closed(connection);
     }
+    for (const TcpId connection : dropped) {
+      std::fprintf(stderr, "ur-sim: dropped a client of %s that does not read\n",
+                   std::string(name_of(session_ports_[connection])).c_str());
+      tcp_.abort(connection);
+      closed(connection);
+    }
   }
 
   SimulatedUr& robot_;
   Tcp tcp_;
   std::map<TcpId, Port> ports_;
   std::map<TcpId, Session*> sessions_;
+  std::map<TcpId, Port> session_ports_;
   std::map<TcpId, Dialled> dialled_;  ///< by scripts
   std::vector<TcpId> waiting_;        ///< connections with something to send
 };

@@ -73,6 +73,17 @@ TEST_CASE("a peer that does not read stops a sender without blocking it", "[tcp]
                    {client}));
 }
 
+TEST_CASE("a peer that does not read hears of an abort", "[tcp]") {
+  Tcp tcp;
+  Collected events;
+  const TcpId listener = *tcp.listen("127.0.0.1", 0);
+  const TcpId client = *tcp.dial("127.0.0.1", tcp.port_of(listener));
+  REQUIRE(poll_until(tcp, events, [&] { return !events.accepted.empty() && !events.dialled.empty(); }));
+  tcp.abort(client);
+  CHECK(poll_until(tcp, events, [&] { return !events.gone.empty(); }));
+  CHECK(events.gone == std::vector<TcpId>{events.accepted[0]});
+}
+
 TEST_CASE("what cannot be listened on or dialled is an error with its cause", "[tcp]") {
   Tcp tcp;
   Collected events;
