@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -293,6 +294,19 @@ int run_job(const RunCommand& command) {
   return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());
 }
 
+/// HOST or HOST:PORT; without one the port of the External Control URCap.
+Result<sim::ur::ExternalControl> external_control_of(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  int port = 50002;
+  if (colon != std::string::npos) {
+    const auto [end, error] = std::from_chars(text.data() + colon + 1, text.data() + text.size(), port);
+    if (error != std::errc{} || end != text.data() + text.size() || port < 1 || port > 65535) {
+      return failure(Fault::kUsage, "--external-control {}: no port after the colon", text);
+    }
+  }
+  return sim::ur::ExternalControl{text.substr(0, colon), static_cast<std::uint16_t>(port)};
+}
+
 int run_ur_sim(const UrSimCommand& command) {
   const auto identity = sim::ur::identify_controller(command.model, command.seed, command.serial);
   if (!identity) return fail(identity.error());
@@ -301,7 +315,12 @@ int run_ur_sim(const UrSimCommand& command) {
   for (const std::string& path : command.programs) {
     const Result<std::string> script = read_text_file(path, sim::ur::kScriptBytesMax);
     if (!script) return fail(script.error());
-    options.programs.push_back({std::filesystem::path(path).stem().string() + ".urp", *script});
+    options.programs.push_back({std::filesystem::path(path).stem().string() + ".urp", *script, {}});
+  }
+  if (!command.external_control.empty()) {
+    const auto external = external_control_of(command.external_control);
+    if (!external) return fail(external.error());
+    options.programs.push_back({"external_control.urp", "", *external});
   }
   sim::ur::SimulatedUr robot(*identity, options);
   catch_stop_signals();

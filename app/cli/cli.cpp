@@ -179,6 +179,10 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                    "URScript file that `load` of the dashboard finds under its name, ending in .urp; may be repeated")
       ->allow_extra_args(false);
 
+  ur_sim_app->add_option(
+      "--external-control", ur_sim.external_control,
+      "HOST or HOST:PORT (50002): whom the program external_control.urp asks for its script at Play");
+
   ReplayCommand replay;
   CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
   replay_app->add_option("journal", replay.journal, "journal.flj of a run")->required();

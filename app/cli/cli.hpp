@@ -43,6 +43,7 @@ struct UrSimCommand {
   std::string serial;                 ///< empty: made up from the seed
   bool running = false;               ///< starts with the brakes released
   std::vector<std::string> programs;  ///< URScript files that `load` finds
+  std::string external_control;       ///< HOST or HOST:PORT; empty: no such program
 };
 
 using Command =

@@ -179,7 +179,7 @@ void wait_for_answer(Connection& dashboard, const std::string& command, const st
 
 TEST_CASE("ur-sim is brought up, streams and runs a script", "[scenario]") {
   UrSim robot({"--model", "ur5e", "--serial", "20195599999"});
-  CHECK_THAT(robot.said, Contains("RTDE on 127.0.0.1:" + std::to_string(30004 + robot.offset)));
+  CHECK_THAT(robot.said, Contains(std::string("RTDE on 127.0.0.1:") + std::to_string(30004 + robot.offset)));
   Connection dashboard(robot, 29999);
   CHECK(dashboard.line() == "Connected: Universal Robots Dashboard Server");
   CHECK(dashboard.ask("get serial number") == "20195599999");
@@ -215,7 +215,7 @@ TEST_CASE("a script dials back to the computer that sent it", "[scenario]") {
   int port = 45'000 + getpid() % 1000, listener = -1;
   while (listener < 0) listener = bind_to(++port);
   Connection primary(robot, 30001);
-  primary.send("def dial():\n  socket_open(\"127.0.0.1\", " + std::to_string(port) +
+  primary.send(std::string("def dial():\n  socket_open(\"127.0.0.1\", ") + std::to_string(port) +
                ")\n  socket_send_line(\"hello\")\n  textmsg(socket_read_line(timeout=0))\nend\n");
   pollfd ready{listener, POLLIN, 0};
   REQUIRE(poll(&ready, 1, kLimit_ms) == 1);

@@ -17,6 +17,7 @@ Programs::Programs(Controller& controller, std::vector<StoredProgram> stored)
 
 void Programs::set_sockets(script::Sockets* sockets) {
   end_program();
+  request_.reset();
   pending_.reset();
   secondary_.clear();
   sockets_ = sockets;
@@ -40,7 +41,31 @@ void Programs::begin_pending() {
   controller_.tell({.kind = Kind::kKey, .title = "PROGRAM_XXX_STARTED", .text = program_->code().name});
 }
 
+bool Programs::start_loaded() {
+  if (loaded_ == nullptr) return false;
+  if (loaded_->external.port == 0) return start(loaded_->script);
+  if (sockets_ == nullptr) return false;
+  request_ = std::make_unique<ProgramRequest>(loaded_->external, *sockets_);
+  return true;
+}
+
+void Programs::follow_request() {
+  if (request_ == nullptr) return;
+  const ProgramRequest::State state = request_->step(controller_.identity().cycle.seconds());
+  if (state == ProgramRequest::State::kWaiting) return;
+  const std::unique_ptr<ProgramRequest> request = std::move(request_);
+  if (state == ProgramRequest::State::kAnswered) {
+    static_cast<void>(start(request->program()));
+  } else {
+    controller_.tell({.kind = Kind::kPopup,
+                      .error = true,
+                      .title = "External Control",
+                      .text = fmt::format("No program from {}:{}", loaded_->external.host, loaded_->external.port)});
+  }
+}
+
 void Programs::step() {
+  follow_request();
   const RuntimeState runtime = controller_.state().runtime;
   if (runtime == RuntimeState::kStopping || runtime == RuntimeState::kStopped) end_program();
   if (pending_ != nullptr && program_ == nullptr && runtime == RuntimeState::kStopped) {
@@ -110,7 +135,7 @@ bool Programs::play() {
       return true;
     case RuntimeState::kStopped:
     case RuntimeState::kStopping:
-      return loaded_ != nullptr && start(loaded_->script);
+      return start_loaded();
     default:
       return true;  // it plays
   }
@@ -123,7 +148,8 @@ bool Programs::pause() {
 }
 
 bool Programs::stop() {
-  const bool running = controller_.state().program_running() || pending_ != nullptr;
+  const bool running = controller_.state().program_running() || pending_ != nullptr || request_ != nullptr;
+  request_.reset();
   pending_.reset();
   controller_.stop();
   return running;

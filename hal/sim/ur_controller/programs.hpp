@@ -7,14 +7,16 @@
 #include <vector>
 
 #include "hal/sim/ur_controller/controller.hpp"
+#include "hal/sim/ur_controller/program_request.hpp"
 #include "hal/sim/ur_controller/script/machine.hpp"
 
 namespace firstlook::sim::ur {
 
 /// A file on the controller: `load NAME` of the dashboard finds it, with or without the folder before it.
 struct StoredProgram {
-  std::string name;    ///< "cart.urp"
-  std::string script;  ///< URScript, one `def ... end`
+  std::string name;            ///< "cart.urp"
+  std::string script;          ///< URScript, one `def ... end`
+  ExternalControl external{};  ///< asked for the script at each Play instead, where it names a port
 };
 
 class Programs {
@@ -45,6 +47,8 @@ class Programs {
 
  private:
   [[nodiscard]] bool start(const std::string& script);
+  [[nodiscard]] bool start_loaded();
+  void follow_request();
   void begin_pending();
   void end_program();
   void tell_error(const script::ScriptError& error);
@@ -53,6 +57,7 @@ class Programs {
   std::vector<StoredProgram> stored_;
   script::Sockets* sockets_ = nullptr;
   const StoredProgram* loaded_ = nullptr;
+  std::unique_ptr<ProgramRequest> request_;
   std::unique_ptr<script::Machine> program_;
   std::unique_ptr<script::Machine> pending_;  ///< begins when the arm stands
   std::vector<std::unique_ptr<script::Machine>> secondary_;

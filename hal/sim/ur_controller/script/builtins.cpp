@@ -140,8 +140,9 @@ JointVector Call::joints(std::size_t i) {
 bool Call::waited(double seconds) {
   CallState& call = state();
   if (call.first) call.until_s = machine_.now_s() + seconds;
-  // Half a cycle of tolerance: sums of cycles are not exact.
-  if (machine_.now_s() >= call.until_s - machine_.cycle_s() / 2) return true;
+  // Half a cycle of tolerance, since sums of cycles are not exact; but any time takes a cycle.
+  const bool begins = call.first && seconds > 0;
+  if (!begins && machine_.now_s() >= call.until_s - machine_.cycle_s() / 2) return true;
   wait();
   return false;
 }

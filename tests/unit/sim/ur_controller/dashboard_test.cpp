@@ -44,7 +44,7 @@ TEST_CASE("the dashboard brings the robot up and down", "[ur]") {
 }
 
 TEST_CASE("programs are loaded, played, paused and stopped from the dashboard", "[ur]") {
-  UrRobot robot("ur5", true, {{"cart.urp", "def cart():\n  while True:\n    sync()\n  end\nend\n"}});
+  UrRobot robot("ur5", true, {{"cart.urp", "def cart():\n  while True:\n    sync()\n  end\nend\n", {}}});
   CHECK(robot.dashboard("get loaded program") == "No program loaded");
   CHECK(robot.dashboard("programState") == "STOPPED <unnamed>");
   CHECK(robot.dashboard("play") == "Failed to execute: play");
@@ -84,7 +84,7 @@ TEST_CASE("commands of one generation are unknown to the other", "[ur]") {
   UrRobot cb3("ur5"), e_series("ur5e");
   for (const char* command : {"is in remote control", "get operational mode", "safetystatus", "version",
                               "set operational mode manual", "clear operational mode"}) {
-    CHECK(cb3.dashboard(command) == "could not understand: '" + std::string(command) + "'");
+    CHECK(cb3.dashboard(command) == std::string("could not understand: '") + std::string(command) + "'");
     CHECK_THAT(e_series.dashboard(command), !StartsWith("could not understand"));
   }
   CHECK(e_series.dashboard("is in remote control") == "true");

@@ -159,11 +159,11 @@ TEST_CASE("inputs take effect: slider, outputs under their masks, registers", "[
   CHECK(client.inputs("input_bit_registers0_to_31,input_bit_register_64,input_int_register_0,input_int_register_47,"
                       "input_double_register_47") == with_id(4, "UINT32,BOOL,INT32,INT32,DOUBLE"));
   client.start();
-  CHECK(client.send(rtde('U', "\1" + big_endian(1, 4) + big_endian(0.25))).empty());
+  CHECK(client.send(rtde('U', std::string("\1") + big_endian(1, 4) + big_endian(0.25))).empty());
   CHECK(robot.state().speed_slider == 0.25);
-  CHECK(client.send(rtde('U', "\1" + big_endian(0, 4) + big_endian(0.5))).empty());
+  CHECK(client.send(rtde('U', std::string("\1") + big_endian(0, 4) + big_endian(0.5))).empty());
   CHECK(robot.state().speed_slider == 0.25);
-  CHECK(client.send(rtde('U', "\1" + big_endian(1, 4) + big_endian(std::nan("")))).empty());
+  CHECK(client.send(rtde('U', std::string("\1") + big_endian(1, 4) + big_endian(std::nan("")))).empty());
   CHECK(robot.state().speed_slider == 0.25);
 
   CHECK(client.send(rtde('U', std::string("\2\x05\x07\x80\xff\x02\x02", 7))).empty());
@@ -177,7 +177,7 @@ TEST_CASE("inputs take effect: slider, outputs under their masks, registers", "[
   CHECK(robot.state().io.analog_types == 0b1000);
 
   CHECK(client
-            .send(rtde('U', "\4" + big_endian(0x80000001, 4) + "\1" + big_endian(42, 4) +
+            .send(rtde('U', std::string("\4") + big_endian(0x80000001, 4) + std::string("\1") + big_endian(42, 4) +
                                 big_endian(static_cast<std::uint32_t>(-7), 4) + big_endian(2.5)))
             .empty());
   CHECK(robot.state().inputs.bits[0] == 0x80000001);
@@ -188,7 +188,7 @@ TEST_CASE("inputs take effect: slider, outputs under their masks, registers", "[
 
   // Registers leave outputs alone that something else has changed meanwhile.
   robot.robot.controller().io().set_output(0, true);
-  CHECK(client.send(rtde('U', "\4" + std::string(21, '\0'))).empty());
+  CHECK(client.send(rtde('U', std::string("\4") + std::string(21, '\0'))).empty());
   CHECK(robot.state().io.output(0));
 }
 
@@ -201,7 +201,7 @@ TEST_CASE("an input belongs to one client until it leaves", "[ur]") {
   CHECK(first.inputs("input_int_register_3") == with_id(2, "INT32"));  // its own
   CHECK(second.inputs("input_int_register_3,input_int_register_4,none") == with_id(0, "IN_USE,INT32,NOT_FOUND"));
   CHECK(second.inputs("input_int_register_4") == with_id(1, "INT32"));
-  CHECK(second.send(rtde('U', "\2" + big_endian(1, 4))).at(0).type == 'M');
+  CHECK(second.send(rtde('U', std::string("\2") + big_endian(1, 4))).at(0).type == 'M');
   robot.robot.close(first.session);
   CHECK(second.inputs("input_int_register_3") == with_id(2, "INT32"));
 }
@@ -211,8 +211,9 @@ TEST_CASE("data of a wrong size or number change nothing and are answered in wor
   Client client(robot);
   client.protocol_2();
   CHECK(client.inputs("input_int_register_0")[0] == 1);
-  for (const std::string& payload : {"\1" + big_endian(5, 2), "\1" + big_endian(5, 8), "\3" + big_endian(5, 4),
-                                     std::string(1, '\0') + big_endian(5, 4), std::string()}) {
+  for (const std::string& payload :
+       {std::string("\1") + big_endian(5, 2), std::string("\1") + big_endian(5, 8),
+        std::string("\3") + big_endian(5, 4), std::string(1, '\0') + big_endian(5, 4), std::string()}) {
     const RtdePackage answer = client.ask(rtde('U', payload));
     CHECK(answer.type == 'M');
     CHECK(static_cast<std::size_t>(answer.payload[0]) < answer.payload.size());

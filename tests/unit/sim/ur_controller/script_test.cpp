@@ -271,7 +271,7 @@ TEST_CASE("a fault while it runs ends the program and is told with its place", "
 TEST_CASE("a script moves the arm and a new one replaces it", "[ur][script]") {
   ScriptRobot robot("ur5");
   const Vector6 from = robot.state().q_rad;
-  robot.send("movej(" + script::text_of(script::Value(script::list_of(from))) + ", a=1, v=0.5)\n", 0.2);
+  robot.send(std::string("movej(") + script::text_of(script::Value(script::list_of(from))) + ", a=1, v=0.5)\n", 0.2);
   CHECK(robot.exceptions.empty());
   robot.send(
       "def go():\n  q = get_actual_joint_positions()\n  q[0] = q[0] + 1\n  movej(q, a=1, v=0.5)\n"
@@ -280,7 +280,8 @@ TEST_CASE("a script moves the arm and a new one replaces it", "[ur][script]") {
   CHECK(robot.state().qd_rad_s[0] == Approx(0.5));
   CHECK(robot.state().script_line == 4);
   CHECK(robot.texts.empty());
-  robot.send("def back():\n  movej(p[" + fmt::format("{}", fmt::join(robot.state().tcp_pose, ",")) + "], t=2)\nend\n",
+  robot.send(std::string("def back():\n  movej(p[") + fmt::format("{}", fmt::join(robot.state().tcp_pose, ",")) +
+                 "], t=2)\nend\n",
              5);
   CHECK(robot.exceptions.empty());
   CHECK(robot.texts.empty());
@@ -415,8 +416,17 @@ TEST_CASE("a program may be without end, but not without bounds", "[ur][script]"
   for (int i = 0; i < 100'000; ++i) deep += "not ";
   CHECK_FALSE(script::compile(deep + "True\n"));
   std::string many = "def f():\n";
-  for (int i = 0; i < 1000; ++i) many += "  def g" + std::to_string(i) + "():\n";
+  for (int i = 0; i < 1000; ++i) many += std::string("  def g") + std::to_string(i) + "():\n";
   CHECK_FALSE(script::compile(many));
+}
+
+TEST_CASE("the shortest sleep takes a cycle", "[ur][script]") {
+  ScriptRobot robot("ur5");
+  robot.send("def f():\n  i = 0\n  while i < 1000:\n    sleep(0.001)\n    i = i + 1\n  end\n  textmsg(i)\nend\n", 7.9);
+  CHECK(robot.texts.empty());
+  robot.listen(0.2);
+  CHECK(robot.texts == std::vector<std::string>{"1000"});
+  CHECK(robot.exceptions.empty());
 }
 
 TEST_CASE("scripts need a robot that runs", "[ur][script]") {
@@ -486,6 +496,35 @@ end
   robot.send("textmsg(socket_open(\"10.0.0.1\", 1))\n", 3);
   CHECK(robot.texts == std::vector<std::string>{"False"});
   robot.robot.programs().set_sockets(nullptr);
+}
+
+TEST_CASE("External Control asks another computer for its program at Play", "[ur][script]") {
+  FakePeer peer;
+  UrRobot with_program("ur5e", true, {{"external_control.urp", "", {"10.0.0.2", 50002}}});
+  with_program.robot.programs().set_sockets(&peer);
+  CHECK_THAT(with_program.dashboard("load external_control.urp"), StartsWith("Loading program"));
+  CHECK(with_program.dashboard("play") == "Starting program");
+  with_program.run(0.1);
+  CHECK(peer.host == "10.0.0.2");
+  CHECK(peer.sent == "request_program\n");
+  CHECK(with_program.state().runtime == RuntimeState::kStopped);
+  peer.to_robot = "set_digital_out(3, True)\nwhile True:\n";
+  with_program.run(0.3);
+  peer.to_robot = "  sync()\nend\n";
+  with_program.run(0.3);
+  CHECK(with_program.state().runtime == RuntimeState::kStopped);  // more could come
+  with_program.run(0.4);
+  CHECK(with_program.state().runtime == RuntimeState::kPlaying);
+  CHECK(with_program.state().io.output(3));
+  CHECK(with_program.dashboard("stop") == "Stopped");
+  with_program.run(0.1);
+
+  // Nobody answers: nothing starts.
+  CHECK(with_program.dashboard("play") == "Starting program");
+  with_program.run(3);
+  CHECK(with_program.state().runtime == RuntimeState::kStopped);
+  CHECK(with_program.dashboard("stop") == "Failed to execute: stop");
+  with_program.robot.programs().set_sockets(nullptr);
 }
 
 }  // namespace firstlook
