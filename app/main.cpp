@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <system_error>
 
@@ -19,6 +21,8 @@
 #include "app/shell/replay.hpp"
 #include "hal/sim/faults.hpp"
 #include "hal/sim/simulated_cell.hpp"
+#include "hal/sim/ur_controller/tcp_service.hpp"
+#include "platform/linux/files.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/terminal.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -311,6 +315,45 @@ int run_campaign_of(const CampaignCommandOptions& options) {
   return run_campaign_command(options);
 }
 
+/// HOST or HOST:PORT; without one the port of the External Control URCap.
+Result<sim::ur::ExternalControl> external_control_of(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  int port = 50002;
+  if (colon != std::string::npos) {
+    const auto [end, error] = std::from_chars(text.data() + colon + 1, text.data() + text.size(), port);
+    if (error != std::errc{} || end != text.data() + text.size() || port < 1 || port > 65535) {
+      return failure(Fault::kUsage, "--external-control {}: no port after the colon", text);
+    }
+  }
+  return sim::ur::ExternalControl{text.substr(0, colon), static_cast<std::uint16_t>(port)};
+}
+
+int run_ur_sim(const UrSimCommand& command) {
+  const auto identity = sim::ur::identify_controller(command.model, command.seed, command.serial);
+  if (!identity) return fail(identity.error());
+  sim::ur::SimulatedUrOptions options;
+  options.running = command.running;
+  for (const std::string& path : command.programs) {
+    const Result<std::string> script = read_text_file(path, sim::ur::kScriptBytesMax);
+    if (!script) return fail(script.error());
+    options.programs.push_back({std::filesystem::path(path).stem().string() + ".urp", *script, {}});
+  }
+  if (!command.external_control.empty()) {
+    const auto external = external_control_of(command.external_control);
+    if (!external) return fail(external.error());
+    options.programs.push_back({"external_control.urp", "", *external});
+  }
+  sim::ur::SimulatedUr robot(*identity, options);
+  catch_stop_signals();
+  const Status served = sim::ur::serve_on_tcp(robot, {command.host, command.port_offset});
+  if (served) return kDone;
+  std::fprintf(stderr,
+               "firstlook: E%d %s\n  What to do: end the program that has the port, or choose another --port-offset or "
+               "--host; ports below 1024 need root.\n",
+               static_cast<int>(served.error().fault), std::string(served.error().detail()).c_str());
+  return exit_code_of(served.error());
+}
+
 /// Data that nobody received must not look like success: a full disk shows itself only here.
 bool flush_stdout() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return true;
@@ -326,6 +369,7 @@ struct Dispatch {
   int operator()(const ExportCommandOptions& c) const { return run_export_command(c); }
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const CampaignCommandOptions& c) const { return run_campaign_of(c); }
+  int operator()(const UrSimCommand& c) const { return run_ur_sim(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

@@ -197,6 +197,32 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   CampaignCommandOptions campaign;
   CLI::App* campaign_app = add_campaign(app, campaign);
+  UrSimCommand ur_sim;
+  CLI::App* ur_sim_app = app.add_subcommand(
+      "ur-sim", "a simulated Universal Robots controller on TCP: RTDE, dashboard, primary, secondary, realtime");
+  ur_sim_app
+      ->add_option("--model", ur_sim.model, "ur3, ur5, ur10 (CB3, 3.15, 125 Hz); ur3e, ur5e, ur10e (5.12, 500 Hz)")
+      ->check(CLI::IsMember({"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"}))
+      ->capture_default_str();
+  ur_sim_app->add_option("--host", ur_sim.host, "address to listen on; 0.0.0.0: every one of this computer")
+      ->capture_default_str();
+  ur_sim_app
+      ->add_option("--port-offset", ur_sim.port_offset, "added to the ports 29999, 30001 to 30004, 30011 to 30013")
+      ->check(CLI::Range(-29000, 35500))
+      ->capture_default_str();
+  ur_sim_app->add_option("--seed", ur_sim.seed, "draws the arm's factory correction; 0: the published kinematics")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}))
+      ->capture_default_str();
+  ur_sim_app->add_option("--serial", ur_sim.serial, "serial number (default: made up from the seed)");
+  ur_sim_app->add_flag("--running", ur_sim.running, "start with the brakes released instead of without power");
+  ur_sim_app
+      ->add_option("--program", ur_sim.programs,
+                   "URScript file that `load` of the dashboard finds under its name, ending in .urp; may be repeated")
+      ->allow_extra_args(false);
+
+  ur_sim_app->add_option(
+      "--external-control", ur_sim.external_control,
+      "HOST or HOST:PORT (50002): whom the program external_control.urp asks for its script at Play");
 
   ReplayCommand replay;
   CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
@@ -252,6 +278,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   }
   if (board_app->parsed()) return {board, 0};
   if (campaign_app->parsed()) return {campaign, 0};
+  if (ur_sim_app->parsed()) return {ur_sim, 0};
   if (replay_app->parsed()) return {replay, 0};
   if (states_app->parsed()) return {StatesCommand{}, 0};
   if (explain_app->parsed()) return {explain, 0};

@@ -1,9 +1,11 @@
 /// The command line: what was asked for, as values. Running it is main's business.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "app/cli/board_command.hpp"
 #include "app/cli/calibrate_command.hpp"
@@ -34,10 +36,20 @@ struct StatesCommand {};
 struct ExplainCommand {
   std::string code;
 };
+struct UrSimCommand {
+  std::string model = "ur5";
+  std::string host = "127.0.0.1";
+  int port_offset = 0;
+  std::uint64_t seed = 0;
+  std::string serial;                 ///< empty: made up from the seed
+  bool running = false;               ///< starts with the brakes released
+  std::vector<std::string> programs;  ///< URScript files that `load` finds
+  std::string external_control;       ///< HOST or HOST:PORT; empty: no such program
+};
 
-using Command =
-    std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions, BoardCommandOptions,
-                 CampaignCommandOptions, ReplayCommand, StatesCommand, ExplainCommand, ConfigCommandOptions>;
+using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,
+                             BoardCommandOptions, CampaignCommandOptions, ReplayCommand, StatesCommand, ExplainCommand,
+                             ConfigCommandOptions, UrSimCommand>;
 
 /// Either a command, or the exit code after help, version or an error of usage were printed.
 struct ParsedCommandLine {

@@ -14,5 +14,6 @@ inline constexpr std::uint64_t kColorNoiseStream = 5106;
 inline constexpr std::uint64_t kDepthNoiseStream = 5107;
 inline constexpr std::uint64_t kTouchStream = 5108;
 inline constexpr std::uint64_t kTipStream = 5109;
+inline constexpr std::uint64_t kFactoryCorrectionStream = 5110;
 
 }  // namespace firstlook::sim

@@ -1,0 +1,88 @@
+/// How the simulated arm moves, one control cycle at a time: movej, movel, servoj, speedj, speedl, stops, pauses and
+/// the speed slider. Paths are run on a time of their own, so that whatever slows the arm keeps it on its path.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "algorithms/kinematics/arm_model.hpp"
+#include "hal/sim/joint_motion.hpp"
+#include "hal/sim/ur_controller/rotation_vector.hpp"
+
+namespace firstlook::sim::ur {
+
+/// What ends a motion with a protective stop.
+enum class MotionFault : std::uint8_t { kJointLimit, kOutOfReach, kJointTooFast };
+[[nodiscard]] std::string_view name_of(MotionFault fault);
+
+class ArmMotion {
+ public:
+  using Ticket = std::uint64_t;
+
+  ArmMotion(const ArmModel& arm, const JointVector& start_rad);
+
+  /// Straight in joint space. Positive speed (rad/s) and acceleration (rad/s²); a positive `time_s` wins over the
+  /// speed.
+  Ticket movej(const JointVector& target_rad, double speed_rad_s, double acceleration_rad_s2, double time_s);
+  /// The flange straight to `target`, the turn evenly spread over the way. m/s, m/s².
+  Ticket movel(const Pose& base_T_flange, double speed_m_s, double acceleration_m_s2, double time_s);
+  /// Follows a target that is renewed each cycle; `lookahead_s` smooths (0.03 to 0.2).
+  void servoj(const JointVector& target_rad, double lookahead_s);
+  /// Accelerates every joint to its speed and keeps it.
+  void speedj(const JointVector& speed_rad_s, double acceleration_rad_s2);
+  /// The same for the flange: m/s and rad/s in Base, m/s².
+  void speedl(const Vector6& twist, double acceleration_m_s2);
+  /// Brakes with this deceleration (rad/s²), on the path where there is one. Done when the arm stands.
+  Ticket stop(double deceleration_rad_s2);
+  /// Brakes on the path and waits there, until let go.
+  void hold(bool held) { held_ = held; }
+  /// At once at rest: the power is off, or the brakes are in.
+  void lock();
+  /// Puts a standing arm elsewhere, without a motion: for tests and cells.
+  void place(const JointVector& at_rad);
+
+  /// One cycle of `cycle_s` at `speed_fraction` (the slider, 0 to 1). A fault leaves the arm where it was.
+  [[nodiscard]] std::optional<MotionFault> step(double cycle_s, double speed_fraction);
+
+  [[nodiscard]] bool done(Ticket ticket) const { return ticket < ticket_ || mode_ == Mode::kRest; }
+  /// A path or a speed is under way: nobody else may start one.
+  [[nodiscard]] bool busy() const { return mode_ != Mode::kRest; }
+  [[nodiscard]] bool standing() const { return velocity_rad_s_.max_abs() < 1e-9; }
+  [[nodiscard]] const JointVector& position_rad() const { return position_rad_; }
+  [[nodiscard]] const JointVector& velocity_rad_s() const { return velocity_rad_s_; }
+  [[nodiscard]] const JointVector& acceleration_rad_s2() const { return acceleration_rad_s2_; }
+  /// How fast the path's own time runs: the slider, ramped, 0 while held.
+  [[nodiscard]] double scale() const { return scale_; }
+
+ private:
+  enum class Mode : std::uint8_t { kRest, kJointPath, kLinePath, kServo, kJointSpeed, kFlangeSpeed, kStopping };
+
+  Ticket begin(Mode mode);
+  [[nodiscard]] JointVector next(double cycle_s, std::optional<MotionFault>& fault);
+  [[nodiscard]] JointVector next_on_line(std::optional<MotionFault>& fault) const;
+  [[nodiscard]] JointVector toward_speed(const JointVector& speed_rad_s, double cycle_s) const;
+  [[nodiscard]] JointVector flange_speed(std::optional<MotionFault>& fault) const;
+  [[nodiscard]] std::optional<MotionFault> check(const JointVector& next_rad, double cycle_s) const;
+  void ramp_scale(double cycle_s, double speed_fraction);
+  void come_to_rest();
+
+  const ArmModel& arm_;
+  Mode mode_ = Mode::kRest;
+  Mode stopped_mode_ = Mode::kRest;  ///< what kStopping brakes on
+  Ticket ticket_ = 0;
+  bool held_ = false;
+  double scale_ = 1;
+  double braking_1_s_ = 0;  ///< of the scale, while stopping on a path
+  JointVector position_rad_, velocity_rad_s_, acceleration_rad_s2_;
+
+  JointMotion path_;  ///< along joints, or along metres and radians of the line as its one "joint"
+  double path_time_s_ = 0;
+  Pose line_from_ = Pose::Identity(), line_to_ = Pose::Identity();
+  JointVector target_rad_;  ///< of servoj; the speed of speedj
+  double lookahead_s_ = 0;
+  Vector6 twist_{};
+  double acceleration_limit_ = 0;
+};
+
+}  // namespace firstlook::sim::ur

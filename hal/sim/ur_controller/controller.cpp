@@ -1,0 +1,222 @@
+#include "hal/sim/ur_controller/controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace firstlook::sim::ur {
+namespace {
+
+// Clients take a controller whose clock is younger than 40 s for one that still boots.
+constexpr double kStartedBefore_s = 60;
+// Folded over the base, away from singularities and limits: where UR's own simulator starts, too.
+const JointVector kStart_rad = {-1.6007, -1.7271, -2.203, -0.808, 1.5951, -0.031};
+
+constexpr double kPowerOn_s = 1.0;
+constexpr double kReleaseBrakes_s = 0.5;
+constexpr double kInspect_s = 5;  // of a protective stop, before it can be unlocked
+
+constexpr double kProgramStop_rad_s2 = 10;
+constexpr double kProtectiveStop_rad_s2 = 20;
+
+Vector6 vector_of_joints(const JointVector& q) {
+  Vector6 v{};
+  for (int j = 0; j < 6; ++j) v[static_cast<std::size_t>(j)] = q[j];
+  return v;
+}
+
+}  // namespace
+
+Controller::Controller(const ControllerIdentity& identity) : identity_(identity), motion_(identity_.arm, kStart_rad) {
+  state_.timestamp_s = kStartedBefore_s;
+  report_arm();
+}
+
+void Controller::tell(ControllerEvent event) {
+  event.timestamp_s = state_.timestamp_s;
+  events_.add(std::move(event));
+}
+
+void Controller::set_safety(SafetyMode mode) {
+  if (state_.safety_mode == mode) return;
+  state_.safety_mode = mode;
+  tell({.kind = ControllerEvent::Kind::kSafetyMode, .argument = static_cast<std::int32_t>(mode)});
+}
+
+void Controller::power_on() {
+  if (state_.robot_mode != RobotMode::kPowerOff || state_.emergency_stopped()) return;
+  state_.robot_mode = RobotMode::kPowerOn;
+  mode_until_ = state_.control_step + static_cast<std::uint64_t>(kPowerOn_s * identity_.frequency_hz());
+}
+
+void Controller::power_off() {
+  stop();
+  motion_.lock();
+  state_.robot_mode = RobotMode::kPowerOff;
+  releasing_ = false;
+  mode_until_ = 0;
+  arm_reported_ = false;
+}
+
+void Controller::release_brakes() {
+  power_on();
+  if (state_.robot_mode != RobotMode::kPowerOn && state_.robot_mode != RobotMode::kIdle) return;
+  if (releasing_) return;
+  releasing_ = true;
+  if (state_.robot_mode == RobotMode::kIdle) {
+    mode_until_ = state_.control_step + static_cast<std::uint64_t>(kReleaseBrakes_s * identity_.frequency_hz());
+  }
+}
+
+bool Controller::unlock_protective_stop() {
+  if (state_.safety_mode != SafetyMode::kProtectiveStop) return true;
+  const auto since = static_cast<double>(state_.control_step - protective_since_);
+  if (since < kInspect_s * identity_.frequency_hz()) return false;
+  set_safety(SafetyMode::kNormal);
+  return true;
+}
+
+void Controller::restart_safety() {
+  power_off();
+  set_safety(SafetyMode::kNormal);
+}
+
+void Controller::protective_stop(std::string_view reason) {
+  if (state_.robot_mode != RobotMode::kRunning || state_.safety_mode == SafetyMode::kProtectiveStop) return;
+  set_safety(SafetyMode::kProtectiveStop);
+  protective_since_ = state_.control_step;
+  tell({.kind = ControllerEvent::Kind::kErrorCode,
+        .code = 153,
+        .error = true,
+        .text = fmt::format("Protective stop: {}", reason)});
+  stop();
+  static_cast<void>(motion_.stop(kProtectiveStop_rad_s2));
+}
+
+void Controller::emergency_stop(bool pressed) {
+  if (pressed) {
+    set_safety(SafetyMode::kRobotEmergencyStop);
+    power_off();
+  } else if (state_.safety_mode == SafetyMode::kRobotEmergencyStop) {
+    set_safety(SafetyMode::kNormal);
+  }
+}
+
+void Controller::safeguard(bool open) {
+  if (open && state_.safety_mode == SafetyMode::kNormal) {
+    set_safety(SafetyMode::kSafeguardStop);
+    resume_after_safeguard_ = state_.runtime == RuntimeState::kPlaying;
+    pause();
+  } else if (!open && state_.safety_mode == SafetyMode::kSafeguardStop) {
+    set_safety(SafetyMode::kNormal);
+    if (resume_after_safeguard_) play();
+    resume_after_safeguard_ = false;
+  }
+}
+
+void Controller::set_digital_input(int bit, bool value) {
+  const std::uint64_t mask = std::uint64_t{1} << bit;
+  state_.io.digital_inputs = value ? state_.io.digital_inputs | mask : state_.io.digital_inputs & ~mask;
+}
+
+bool Controller::can_play() const {
+  const bool safe = state_.safety_mode == SafetyMode::kNormal || state_.safety_mode == SafetyMode::kReduced;
+  return safe && state_.robot_mode == RobotMode::kRunning;
+}
+
+void Controller::play() {
+  if (!can_play()) return;
+  motion_.hold(false);
+  const bool paused = state_.runtime == RuntimeState::kPausing || state_.runtime == RuntimeState::kPaused;
+  state_.runtime = paused ? RuntimeState::kResuming : RuntimeState::kPlaying;
+}
+
+void Controller::pause() {
+  if (state_.runtime != RuntimeState::kPlaying && state_.runtime != RuntimeState::kResuming) return;
+  motion_.hold(true);
+  state_.runtime = RuntimeState::kPausing;
+}
+
+void Controller::stop() {
+  resume_after_safeguard_ = false;
+  if (state_.runtime == RuntimeState::kStopped) return;
+  state_.runtime = RuntimeState::kStopping;
+  static_cast<void>(motion_.stop(kProgramStop_rad_s2));
+}
+
+void Controller::set_speed_slider(double fraction) {
+  if (std::isfinite(fraction)) state_.speed_slider = std::clamp(fraction, 0.0, 1.0);
+}
+
+void Controller::set_tcp_offset(const Vector6& flange_T_tcp) {
+  state_.tcp_offset = flange_T_tcp;
+  arm_reported_ = false;
+}
+
+Pose Controller::tcp_pose(const JointVector& q_rad) const {
+  return forward(identity_.arm, q_rad).flange().pose() * flange_T_tcp();
+}
+
+void Controller::advance_modes() {
+  if (mode_until_ == 0 || state_.control_step < mode_until_) return;
+  mode_until_ = 0;
+  if (state_.robot_mode == RobotMode::kPowerOn) {
+    state_.robot_mode = RobotMode::kIdle;
+    if (releasing_) {
+      mode_until_ = state_.control_step + static_cast<std::uint64_t>(kReleaseBrakes_s * identity_.frequency_hz());
+    }
+  } else if (state_.robot_mode == RobotMode::kIdle && releasing_) {
+    releasing_ = false;
+    state_.robot_mode = RobotMode::kRunning;
+  }
+}
+
+void Controller::advance_runtime() {
+  if (state_.runtime == RuntimeState::kStopping && !motion_.busy()) {
+    state_.runtime = RuntimeState::kStopped;
+  } else if (state_.runtime == RuntimeState::kPausing && motion_.standing()) {
+    state_.runtime = RuntimeState::kPaused;
+  } else if (state_.runtime == RuntimeState::kResuming) {
+    state_.runtime = RuntimeState::kPlaying;
+  }
+}
+
+void Controller::report_arm() {
+  const bool moving = motion_.busy() || !motion_.standing();
+  if (arm_reported_ && !moving) return;
+  arm_reported_ = !moving;
+  const JointVector& q = motion_.position_rad();
+  const JointVector& qd = motion_.velocity_rad_s();
+  state_.q_rad = vector_of_joints(q);
+  state_.qd_rad_s = vector_of_joints(qd);
+  state_.qdd_rad_s2 = vector_of_joints(motion_.acceleration_rad_s2());
+
+  const LinkFrames frames = forward(identity_.arm, q);
+  const Pose tcp = frames.flange().pose() * flange_T_tcp();
+  state_.tcp_pose = vector_of(tcp);
+  const Eigen::Vector3d elbow = frames.base_T_link[2].translation();
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero(), turn = speed, elbow_speed = speed;
+  for (int j = 0; j < 6; ++j) {
+    const Pose& link = frames.base_T_link[static_cast<std::size_t>(j)];
+    const Eigen::Vector3d axis = link.linear().col(2) * qd[j];
+    turn += axis;
+    speed += axis.cross(tcp.translation() - link.translation());
+    if (j < 2) elbow_speed += axis.cross(elbow - link.translation());
+  }
+  state_.tcp_speed = {speed.x(), speed.y(), speed.z(), turn.x(), turn.y(), turn.z()};
+  state_.elbow_position_m = {elbow.x(), elbow.y(), elbow.z()};
+  state_.elbow_velocity_m_s = {elbow_speed.x(), elbow_speed.y(), elbow_speed.z()};
+}
+
+void Controller::step() {
+  ++state_.control_step;
+  // Counted, not added up: a day later the clock is still exact.
+  const auto cycles = static_cast<double>(state_.control_step);
+  state_.timestamp_s = kStartedBefore_s + cycles / identity_.frequency_hz();
+  advance_modes();
+  if (const auto fault = motion_.step(identity_.cycle.seconds(), state_.speed_slider)) protective_stop(name_of(*fault));
+  state_.speed_scaling = state_.robot_mode == RobotMode::kRunning ? motion_.scale() : 0;
+  advance_runtime();
+  report_arm();
+}
+
+}  // namespace firstlook::sim::ur

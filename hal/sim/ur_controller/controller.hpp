@@ -1,0 +1,84 @@
+/// The simulated controller without its interfaces: modes and their transitions, the arm, inputs, outputs, registers.
+/// Deterministic; time is the number of control cycles.
+#pragma once
+
+#include <string>
+
+#include "hal/sim/ur_controller/arm_motion.hpp"
+#include "hal/sim/ur_controller/controller_events.hpp"
+#include "hal/sim/ur_controller/controller_identity.hpp"
+#include "hal/sim/ur_controller/controller_state.hpp"
+
+namespace firstlook::sim::ur {
+
+class Controller {
+ public:
+  /// Switched on, arm without power, in a pose from which it can move to all sides.
+  explicit Controller(const ControllerIdentity& identity);
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
+
+  /// One control cycle.
+  void step();
+
+  [[nodiscard]] const ControllerIdentity& identity() const { return identity_; }
+  [[nodiscard]] const ControllerState& state() const { return state_; }
+  [[nodiscard]] EventLog& events() { return events_; }
+  /// Adds an event that happens now.
+  void tell(ControllerEvent event);
+
+  // The pendant and the dashboard. What is not possible in this mode does nothing.
+  void power_on();
+  void power_off();
+  void release_brakes();  ///< switches the power on first where that is needed
+  /// False within 5 s of the stop: nobody can have looked at its cause.
+  [[nodiscard]] bool unlock_protective_stop();
+  void restart_safety();
+  // What happens to it.
+  void protective_stop(std::string_view reason);
+  void emergency_stop(bool pressed);
+  void safeguard(bool open);  ///< a program that played goes on by itself when it is closed
+  void set_digital_input(int bit, bool value);
+
+  // The program's life; its content is run by others.
+  [[nodiscard]] bool can_play() const;
+  void play();  ///< starts, or resumes what was paused
+  void pause();
+  void stop();  ///< the arm brakes on its path
+  /// The program may take its cycle.
+  [[nodiscard]] bool playing() const { return state_.runtime == RuntimeState::kPlaying; }
+
+  // What programs and clients change.
+  [[nodiscard]] ArmMotion& motion() { return motion_; }
+  [[nodiscard]] const ArmMotion& motion() const { return motion_; }
+  [[nodiscard]] InputsOutputs& io() { return state_.io; }
+  [[nodiscard]] Registers& inputs() { return state_.inputs; }
+  [[nodiscard]] Registers& outputs() { return state_.outputs; }
+  void set_speed_slider(double fraction);  ///< clamped to 0..1; not finite: ignored
+  void set_payload(const Payload& payload) { state_.payload = payload; }
+  void set_external_wrench(const Vector6& wrench) { state_.external_wrench = wrench; }
+  void set_tcp_offset(const Vector6& flange_T_tcp);
+  void set_script_line(std::uint32_t line) { state_.script_line = line; }
+
+  /// base_T_tcp of these joints.
+  [[nodiscard]] Pose tcp_pose(const JointVector& q_rad) const;
+  [[nodiscard]] Pose flange_T_tcp() const { return pose_of(state_.tcp_offset); }
+
+ private:
+  void advance_modes();
+  void advance_runtime();
+  void report_arm();
+  void set_safety(SafetyMode mode);
+
+  ControllerIdentity identity_;
+  ArmMotion motion_;
+  ControllerState state_;
+  EventLog events_;
+  std::uint64_t mode_until_ = 0;  ///< the cycle in which kPowerOn, or the release of brakes, ends; 0: nothing under way
+  bool releasing_ = false;
+  std::uint64_t protective_since_ = 0;
+  bool resume_after_safeguard_ = false;
+  bool arm_reported_ = false;  ///< poses are those of the joints
+};
+
+}  // namespace firstlook::sim::ur

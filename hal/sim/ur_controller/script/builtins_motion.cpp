@@ -1,0 +1,190 @@
+// What moves the arm. One thread at a time may.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/kinematics/inverse_kinematics.hpp"
+#include "hal/sim/ur_controller/script/builtins.hpp"
+#include "hal/sim/ur_controller/script/inverse_pose.hpp"
+
+namespace firstlook::sim::ur::script {
+namespace {
+
+constexpr double kSwitch_rad_s2 = 10;  // brakes what moves before a path begins
+constexpr double kAcceleration_rad_s2 = 40;
+constexpr double kAccelerationMin = 0.01;  // of speedj and speedl
+
+/// The arm is this thread's and stands; false while it does not, or when it is another's.
+bool arm_ready(Call& c) {
+  if (!c.machine().take_arm(c.thread())) {
+    c.fail("Another thread is already controlling the robot");
+    return false;
+  }
+  if (!c.ok()) return false;
+  if (!c.controller().motion().busy()) return true;
+  if (c.state().first) static_cast<void>(c.controller().motion().stop(kSwitch_rad_s2));
+  c.wait();
+  return false;
+}
+
+/// Waits for a path; lets the arm go at its end.
+void follow(Call& c) {
+  if (!c.controller().motion().done(c.state().ticket)) return c.wait();
+  c.machine().release_arm(c.thread());
+}
+
+void check_limits(Call& c, double speed, double acceleration, double time_s) {
+  if (!(acceleration > 0)) c.fail("Acceleration must be positive");
+  if (!(speed > 0) && !(time_s > 0)) c.fail("Speed must be positive");
+}
+
+/// No joint beyond its own speed, whatever the leading one's was asked to be.
+double allowed_speed(const ArmModel& arm, const JointVector& way_rad, double speed_rad_s) {
+  const double leading_rad = way_rad.max_abs();
+  for (int j = 0; j < way_rad.size(); ++j) {
+    const double share = leading_rad > 0 ? std::abs(way_rad[j]) / leading_rad : 0;
+    if (share > 0) speed_rad_s = std::min(speed_rad_s, arm.speed_max_rad_s[static_cast<std::size_t>(j)] / share);
+  }
+  return speed_rad_s;
+}
+
+void movej(Call& c) {
+  CallState& state = c.state();
+  if (state.phase == 1) return follow(c);
+  const double acceleration = c.number(1), time_s = c.number(3);
+  check_limits(c, c.number(2), acceleration, time_s);
+  if (!arm_ready(c)) return;
+  const ArmMotion& motion = c.controller().motion();
+  JointVector target_rad = JointVector::zero(6);
+  if (c.value(0).as<PoseValue>() != nullptr) {
+    const auto joints = joints_at(c.controller(), c.pose(0), motion.position_rad());
+    if (!joints) return c.fail("getInverseKin: no solution");
+    target_rad = *joints;
+  } else {
+    target_rad = c.joints(0);
+  }
+  if (!c.ok()) return;
+  if (target_rad.max_abs() > 2 * M_PI) return c.fail("A target joint is out of its range");
+  const ArmModel& arm = c.controller().identity().arm;
+  const double speed = allowed_speed(arm, target_rad - motion.position_rad(), std::max(c.number(2), 1e-6));
+  state.ticket = c.controller().motion().movej(target_rad, speed, acceleration, time_s);
+  state.phase = 1;
+  c.wait();
+}
+
+/// The tool straight to the pose of argument `i`; joints stand for the pose that they reach.
+void begin_line(Call& c, std::size_t i, double speed, double acceleration, double time_s) {
+  check_limits(c, speed, acceleration, time_s);
+  if (!arm_ready(c)) return;
+  const Pose base_T_tcp = c.value(i).as<List>() != nullptr ? c.controller().tcp_pose(c.joints(i)) : c.pose(i);
+  if (!c.ok()) return;
+  const Pose base_T_flange = base_T_tcp * c.controller().flange_T_tcp().inverse(Eigen::Isometry);
+  c.state().ticket = c.controller().motion().movel(base_T_flange, std::max(speed, 1e-6), acceleration, time_s);
+  ++c.state().phase;
+  c.wait();
+}
+
+void movel(Call& c) {
+  if (c.state().phase == 1) return follow(c);
+  begin_line(c, 0, c.number(2), c.number(1), c.number(3));
+}
+
+/// By way of the first pose to the second, on two lines instead of an arc.
+void movec(Call& c) {
+  CallState& state = c.state();
+  if (state.phase == 2) return follow(c);
+  if (state.phase == 1 && !c.controller().motion().done(state.ticket)) return c.wait();
+  begin_line(c, state.phase == 0 ? 0 : 1, c.number(3), c.number(2), 0);
+}
+
+/// servoj, speedj and speedl: the arm stays with the thread until it does something else.
+bool streaming_ready(Call& c) {
+  if (!c.machine().take_arm(c.thread())) c.fail("Another thread is already controlling the robot");
+  return c.ok();
+}
+
+void servoj(Call& c) {
+  const JointVector target_rad = c.joints(0);
+  const double given_s = c.number(3);
+  const double time_s = given_s > 0 ? given_s : c.machine().cycle_s();
+  if (!streaming_ready(c)) return;
+  if (c.state().first) c.controller().motion().servoj(target_rad, std::clamp(c.number(4), 0.03, 0.2));
+  static_cast<void>(c.waited(time_s));
+}
+
+void servoc_pose(Call& c) {
+  if (!streaming_ready(c)) return;
+  const auto joints = joints_at(c.controller(), c.pose(0), c.controller().motion().position_rad());
+  if (!joints) return c.fail("getInverseKin: no solution");
+  if (c.state().first) c.controller().motion().servoj(*joints, 0.03);
+  static_cast<void>(c.waited(c.machine().cycle_s()));
+}
+
+void speedj(Call& c) {
+  const JointVector speed_rad_s = c.joints(0);
+  // No change of speed in a step is an acceleration of 0 to some scripts.
+  const double acceleration = std::max(c.number(1), kAccelerationMin), time_s = c.number(2);
+  if (!streaming_ready(c)) return;
+  if (c.state().first) c.controller().motion().speedj(speed_rad_s, std::min(acceleration, kAcceleration_rad_s2));
+  // Without a time it returns when the speed is reached.
+  const double change = (speed_rad_s - c.controller().motion().velocity_rad_s()).max_abs();
+  static_cast<void>(c.waited(time_s > 0 ? time_s : std::max(change / acceleration, c.machine().cycle_s())));
+}
+
+void speedl(Call& c) {
+  const Vector6 twist = c.six(0);
+  // No change of speed in a step is an acceleration of 0 to some scripts.
+  const double acceleration = std::max(c.number(1), kAccelerationMin), time_s = c.number(2);
+  if (!streaming_ready(c)) return;
+  if (c.state().first) {
+    // The flange turns with the tool and moves so that the tool's centre has the speed.
+    const Eigen::Vector3d turn(twist[3], twist[4], twist[5]);
+    const Pose flange = forward(c.controller().identity().arm, c.controller().motion().position_rad()).flange().pose();
+    const Eigen::Vector3d tool_to_flange = -(flange.linear() * c.controller().flange_T_tcp().translation());
+    const Eigen::Vector3d speed = Eigen::Vector3d(twist[0], twist[1], twist[2]) + turn.cross(tool_to_flange);
+    c.controller().motion().speedl({speed.x(), speed.y(), speed.z(), twist[3], twist[4], twist[5]}, acceleration);
+  }
+  static_cast<void>(c.waited(time_s > 0 ? time_s : std::max(0.5 / acceleration, c.machine().cycle_s())));
+}
+
+void stop_arm(Call& c) {
+  const double deceleration = c.number(0);
+  check_limits(c, 1, deceleration, 0);
+  if (!streaming_ready(c)) return;
+  if (c.state().first) c.state().ticket = c.controller().motion().stop(deceleration);
+  follow(c);
+}
+
+void nothing(Call&) {}
+
+constexpr Builtin kTable[] = {
+    {"enable_external_ft_sensor", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
+    {"end_force_mode", "", nothing},
+    {"end_freedrive_mode", "", nothing},
+    {"force_mode", "task_frame,selection_vector,wrench,type,limits", nothing},
+    {"force_mode_set_damping", "damping", nothing},
+    {"force_mode_set_gain_scaling", "scaling", nothing},
+    {"freedrive_mode", "freeAxes=[],feature=[]", nothing},
+    {"ft_rtde_input_enable", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
+    {"movec", "pose_via,pose_to,a=1.2,v=0.25,r=0,mode=0", movec},
+    {"movej", "q,a=1.4,v=1.05,t=0,r=0", movej},
+    {"movel", "pose,a=1.2,v=0.25,t=0,r=0", movel},
+    {"movep", "pose,a=1.2,v=0.25,t=0,r=0", movel},
+    {"servoc", "pose,a=1.2,v=0.25,r=0", servoc_pose},
+    {"servoj", "q,a=0,v=0,t=0,lookahead_time=0.1,gain=300", servoj},
+    {"speedj", "qd,a=1.4,t=0", speedj},
+    {"speedl", "xd,a=1.2,t=0,aRot=0", speedl},
+    {"end_teach_mode", "", nothing},
+    {"stopj", "a=2", stop_arm},
+    {"stopl", "a=2,aRot=0", stop_arm},
+    {"teach_mode", "", nothing},
+    {"tool_contact", "direction=[]", [](Call& c) { c.answer(std::int64_t{0}); }},
+    {"zero_ftsensor", "", nothing},
+};
+
+}  // namespace
+
+std::span<const Builtin> motion_builtins() { return kTable; }
+
+}  // namespace firstlook::sim::ur::script

@@ -1,0 +1,695 @@
+#include "hal/sim/ur_controller/script/compiler.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "hal/sim/ur_controller/script/builtins.hpp"
+
+namespace firstlook::sim::ur::script {
+namespace {
+
+using Kind = Token::Kind;
+
+constexpr int kNestingMax = 100;  // of blocks and of expressions
+constexpr std::size_t kInstructionsMax = 200'000;
+
+/// Names that begin a block which `end` closes.
+bool opens_block(std::string_view word) {
+  return word == "def" || word == "sec" || word == "thread" || word == "if" || word == "while";
+}
+bool opens_function(std::string_view word) { return word == "def" || word == "sec" || word == "thread"; }
+
+class Compiler {
+ public:
+  Compiler(std::string_view script, std::vector<Token> tokens) : script_(script), tokens_(std::move(tokens)) {}
+
+  std::expected<Code, ScriptError> run() {
+    collect_names();
+    code_.name = "unnamed";
+    skip_line_ends();
+    const bool whole = tokens_[at_].is("def") || tokens_[at_].is("sec");
+    if (whole) {
+      code_.secondary = tokens_[at_].is("sec");
+      code_.name = tokens_[at_ + 1].text;
+      code_.main = function(true);
+      skip_line_ends();
+      if (tokens_[at_].kind != Kind::kEnd) fail_here();
+    } else {
+      begin_function("unnamed", true);
+      while (!error_ && tokens_[at_].kind != Kind::kEnd) statement();
+      code_.main = end_function();
+    }
+    if (error_) return std::unexpected(*error_);
+    return std::move(code_);
+  }
+
+ private:
+  struct Scope {
+    Function function;
+    bool top = false;
+    int number = 0;
+    std::map<std::string, int> locals;
+    std::vector<std::vector<std::size_t>> breaks;  ///< jumps out of each loop, to be aimed at its end
+    std::vector<int> loop_begins;
+  };
+
+  // --- errors ---
+  void fail(ScriptError error) {
+    if (!error_) error_ = std::move(error);
+    at_ = tokens_.size() - 1;  // nothing more to read: every loop ends
+  }
+  void fail_here() { fail(syntax_error(script_, tokens_[at_].line, tokens_[at_].column)); }
+  void fail_name(const Token& name) {
+    fail({name.line, name.column, fmt::format("compile_error_name_not_found:{}:", name.text)});
+  }
+
+  // --- tokens ---
+  [[nodiscard]] const Token& now() const { return tokens_[at_]; }
+  [[nodiscard]] const Token& ahead() const { return tokens_[std::min(at_ + 1, tokens_.size() - 1)]; }
+  void advance() {
+    if (at_ + 1 < tokens_.size()) ++at_;
+  }
+  bool accept(std::string_view symbol) {
+    if (!now().is(symbol)) return false;
+    advance();
+    return true;
+  }
+  void expect(std::string_view symbol) {
+    if (!accept(symbol)) fail_here();
+  }
+  std::string expect_name() {
+    if (now().kind != Kind::kName) {
+      fail_here();
+      return {};
+    }
+    std::string name = now().text;
+    advance();
+    return name;
+  }
+  void expect_line_end() {
+    if (now().kind == Kind::kEnd) return;
+    if (now().kind != Kind::kLineEnd) return fail_here();
+    advance();
+  }
+  void skip_line_ends() {
+    while (now().kind == Kind::kLineEnd) advance();
+  }
+
+  // --- names ---
+  /// Functions may be called above their definition; names that the program's own body assigns, or anybody declares
+  /// `global`, belong to all its functions.
+  void collect_names() {
+    std::vector<bool> functions;  // for each open block: is it a function?
+    int depth = 0;                // of functions
+    bool first = true;
+    for (std::size_t i = 0; i + 1 < tokens_.size(); ++i) {
+      const Token& token = tokens_[i];
+      const bool begins = i == 0 || tokens_[i - 1].kind == Kind::kLineEnd || tokens_[i - 1].is(":");
+      if (!begins || token.kind != Kind::kName) continue;
+      if (opens_block(token.text)) {
+        functions.push_back(opens_function(token.text));
+        if (functions.back()) {
+          const bool program = first && !token.is("thread");
+          if (!program) {
+            function_numbers_.emplace(tokens_[i + 1].text, -1);
+            parameters_[tokens_[i + 1].text] = parameters_at(i + 2);
+          }
+          if (program) program_depth_ = 1;
+          ++depth;
+        }
+        first = false;
+      } else if (token.is("end") && !functions.empty()) {
+        depth -= functions.back() ? 1 : 0;
+        functions.pop_back();
+      } else if (token.is("global")) {
+        declare_global(tokens_[i + 1].text);
+      } else if (depth == program_depth_ && assigns(i)) {
+        declare_global(token.text);
+      }
+      first = first && token.kind == Kind::kLineEnd;
+    }
+  }
+  /// The names between the brackets of a function's head.
+  [[nodiscard]] std::vector<std::string> parameters_at(std::size_t i) const {
+    std::vector<std::string> names;
+    int depth = 0;
+    for (; i < tokens_.size() && tokens_[i].kind != Kind::kLineEnd; ++i) {
+      depth += tokens_[i].is("(") || tokens_[i].is("[") ? 1 : tokens_[i].is(")") || tokens_[i].is("]") ? -1 : 0;
+      const bool begins = depth == 1 && (tokens_[i - 1].is("(") || tokens_[i - 1].is(","));
+      if (begins && tokens_[i].kind == Kind::kName) names.push_back(tokens_[i].text);
+      if (depth == 0) break;
+    }
+    return names;
+  }
+  [[nodiscard]] bool assigns(std::size_t i) const {
+    std::size_t j = i + 1;
+    while (j < tokens_.size() && tokens_[j].is("[")) {
+      int open = 0;
+      do {
+        open += tokens_[j].is("[") ? 1 : tokens_[j].is("]") ? -1 : 0;
+        ++j;
+      } while (j < tokens_.size() && open > 0);
+    }
+    return j < tokens_.size() && tokens_[j].is("=");
+  }
+  void declare_global(const std::string& name) {
+    if (global_numbers_.contains(name)) return;
+    global_numbers_[name] = static_cast<int>(code_.globals.size());
+    code_.globals.push_back(name);
+  }
+  int declare_local(const std::string& name) {
+    Scope& scope = scopes_.back();
+    const auto [entry, added] = scope.locals.emplace(name, scope.function.locals);
+    if (added) ++scope.function.locals;
+    return entry->second;
+  }
+
+  // --- code ---
+  int emit(Op op, int a = 0, int b = 0) { return emit_at(now(), op, a, b); }
+  int emit_at(const Token& where, Op op, int a = 0, int b = 0) {
+    std::vector<Instruction>& instructions = scopes_.back().function.instructions;
+    if (++instructions_ > kInstructionsMax) fail({where.line, where.column, "compile_error_program_too_large:"});
+    instructions.push_back({op, a, b, where.line, where.column});
+    return static_cast<int>(instructions.size()) - 1;
+  }
+  [[nodiscard]] int here() const { return static_cast<int>(scopes_.back().function.instructions.size()); }
+  void aim(int instruction) { scopes_.back().function.instructions[static_cast<std::size_t>(instruction)].a = here(); }
+  void constant(Value value) {
+    code_.constants.push_back(std::move(value));
+    emit(Op::kConstant, static_cast<int>(code_.constants.size()) - 1);
+  }
+
+  // --- functions ---
+  void begin_function(const std::string& name, bool top) {
+    Scope scope;
+    scope.function.name = name;
+    scope.top = top;
+    scope.number = function_number(name, top);
+    scopes_.push_back(std::move(scope));
+  }
+  int function_number(const std::string& name, bool top) {
+    const auto known = top ? function_numbers_.end() : function_numbers_.find(name);
+    if (known != function_numbers_.end() && known->second >= 0) return known->second;
+    code_.functions.emplace_back();
+    const int number = static_cast<int>(code_.functions.size()) - 1;
+    if (known != function_numbers_.end()) known->second = number;
+    return number;
+  }
+  int end_function() {
+    code_.constants.emplace_back();
+    emit(Op::kConstant, static_cast<int>(code_.constants.size()) - 1);
+    emit(Op::kReturn);
+    const int number = scopes_.back().number;
+    code_.functions[static_cast<std::size_t>(number)] = std::move(scopes_.back().function);
+    scopes_.pop_back();
+    return number;
+  }
+  /// From `def`, `sec` or `thread` to its `end`.
+  int function(bool top) {
+    if (scopes_.size() >= kNestingMax) return fail_here(), 0;
+    const bool thread = now().is("thread");
+    advance();
+    const std::string name = expect_name();
+    begin_function(name, top);
+    scopes_.back().function.thread = thread;
+    expect("(");
+    while (!error_ && !now().is(")")) {
+      const int local = declare_local(expect_name());
+      ++scopes_.back().function.parameters;
+      if (accept("=")) default_value(local);
+      if (!accept(",")) break;
+    }
+    expect(")");
+    expect(":");
+    block();
+    expect("end");
+    if (!error_) expect_line_end();
+    return end_function();
+  }
+
+  /// Evaluated in the function, when the caller gave nothing.
+  void default_value(int local) {
+    const int given = emit(Op::kJumpIfSet, 0, local);
+    expression();
+    emit(Op::kStoreLocal, local);
+    aim(given);
+  }
+
+  // --- statements ---
+  void block() {
+    if (++nesting_ > kNestingMax) fail_here();
+    skip_line_ends();
+    while (!error_ && !now().is("end") && !now().is("elif") && !now().is("else")) {
+      if (now().kind == Kind::kEnd) return fail_here();
+      statement();
+    }
+    --nesting_;
+  }
+
+  void statement() {
+    skip_line_ends();
+    if (now().kind == Kind::kEnd || error_) return;
+    if (now().is("def") || now().is("thread")) {
+      static_cast<void>(function(false));
+    } else if (now().is("if")) {
+      if_statement();
+    } else if (now().is("while")) {
+      while_statement();
+    } else if (accept("return")) {
+      if (now().kind == Kind::kLineEnd) {
+        constant({});
+      } else {
+        expression();
+      }
+      emit(Op::kReturn);
+      expect_line_end();
+    } else if (now().is("break") || now().is("continue")) {
+      leave_loop();
+    } else if (accept("halt")) {
+      emit(Op::kHalt);
+      expect_line_end();
+    } else if (accept("pass")) {
+      expect_line_end();
+    } else if (accept("enter_critical")) {
+      emit(Op::kEnterCritical);
+      expect_line_end();
+    } else if (accept("exit_critical")) {
+      emit(Op::kExitCritical);
+      expect_line_end();
+    } else if (now().is("join") || now().is("kill")) {
+      const Op op = now().is("join") ? Op::kJoin : Op::kKill;
+      advance();
+      expression();
+      emit(op);
+      expect_line_end();
+    } else {
+      assignment_or_call();
+    }
+    skip_line_ends();
+  }
+
+  void if_statement() {
+    std::vector<int> to_end;
+    do {
+      advance();  // if, elif
+      expression();
+      expect(":");
+      const int otherwise = emit(Op::kJumpIfFalse);
+      block();
+      to_end.push_back(emit(Op::kJump));
+      aim(otherwise);
+    } while (!error_ && now().is("elif"));
+    if (accept("else")) {
+      expect(":");
+      block();
+    }
+    expect("end");
+    for (const int jump : to_end) aim(jump);
+    if (!error_) expect_line_end();
+  }
+
+  void while_statement() {
+    advance();
+    const int begin = here();
+    scopes_.back().loop_begins.push_back(begin);
+    scopes_.back().breaks.emplace_back();
+    expression();
+    expect(":");
+    const int leave = emit(Op::kJumpIfFalse);
+    block();
+    expect("end");
+    emit(Op::kJump, begin);
+    aim(leave);
+    for (const std::size_t jump : scopes_.back().breaks.back()) aim(static_cast<int>(jump));
+    scopes_.back().breaks.pop_back();
+    scopes_.back().loop_begins.pop_back();
+    if (!error_) expect_line_end();
+  }
+
+  void leave_loop() {
+    Scope& scope = scopes_.back();
+    if (scope.breaks.empty()) return fail_here();
+    if (now().is("break")) {
+      scope.breaks.back().push_back(static_cast<std::size_t>(emit(Op::kJump)));
+    } else {
+      emit(Op::kJump, scope.loop_begins.back());
+    }
+    advance();
+    expect_line_end();
+  }
+
+  void assignment_or_call() {
+    const bool global = now().is("global"), local = now().is("local");
+    if (global || local) advance();
+    if (now().kind == Kind::kName && assigns(at_)) {
+      assignment(global, local);
+    } else if (global && now().kind == Kind::kName) {
+      advance();  // a declaration alone
+    } else if (global || local) {
+      fail_here();
+    } else {
+      expression();
+      emit(Op::kPop);
+    }
+    expect_line_end();
+  }
+
+  void assignment(bool global, bool local) {
+    const Token target = now();
+    advance();
+    int indices = 0;
+    if (now().is("[")) load(target);
+    while (accept("[")) {
+      expression();
+      expect("]");
+      ++indices;
+    }
+    expect("=");
+    expression();
+    if (indices > 0) emit_at(target, Op::kSetElement, indices);
+    store(target, global, local);
+  }
+
+  void store(const Token& target, bool global, bool local) {
+    Scope& scope = scopes_.back();
+    const bool shared = global_numbers_.contains(target.text);
+    const bool own = scope.locals.contains(target.text);
+    if (global || (shared && !own && !(local && !scope.top))) {
+      emit_at(target, Op::kStoreGlobal, global_numbers_[target.text]);
+    } else {
+      emit_at(target, Op::kStoreLocal, declare_local(target.text));
+    }
+  }
+
+  void load(const Token& name) {
+    const Scope& scope = scopes_.back();
+    if (const auto own = scope.locals.find(name.text); own != scope.locals.end()) {
+      emit_at(name, Op::kLoadLocal, own->second);
+    } else if (const auto shared = global_numbers_.find(name.text); shared != global_numbers_.end()) {
+      emit_at(name, Op::kLoadGlobal, shared->second);
+    } else {
+      fail_name(name);
+    }
+  }
+
+  // --- expressions, from the weakest binding ---
+  void expression() {
+    if (++nesting_ > kNestingMax) fail_here();
+    either();
+    --nesting_;
+  }
+  void either() {
+    both();
+    while (!error_ && (now().is("or") || now().is("xor"))) {
+      if (accept("xor")) {
+        both();
+        emit(Op::kBinary, static_cast<int>(BinaryOp::kXor));
+        continue;
+      }
+      advance();
+      const int jump = emit(Op::kJumpIfTrueKeep);
+      both();
+      aim(jump);
+    }
+  }
+  void both() {
+    negation();
+    while (!error_ && accept("and")) {
+      const int jump = emit(Op::kJumpIfFalseKeep);
+      negation();
+      aim(jump);
+    }
+  }
+  void negation() {
+    if (now().is("not")) {
+      if (++nesting_ > kNestingMax) fail_here();
+      advance();
+      negation();
+      emit(Op::kNot);
+      --nesting_;
+      return;
+    }
+    comparison();
+  }
+  void comparison() {
+    sum();
+    const std::map<std::string_view, BinaryOp> operators = {
+        {"==", BinaryOp::kEqual},  {"!=", BinaryOp::kNotEqual},    {"<", BinaryOp::kLess},
+        {">", BinaryOp::kGreater}, {"<=", BinaryOp::kLessOrEqual}, {">=", BinaryOp::kGreaterOrEqual},
+    };
+    while (!error_) {
+      const auto found = operators.find(now().text);
+      if (now().kind != Kind::kSymbol || found == operators.end()) return;
+      const Token where = now();
+      advance();
+      sum();
+      emit_at(where, Op::kBinary, static_cast<int>(found->second));
+    }
+  }
+  void sum() {
+    product();
+    while (!error_ && (now().is("+") || now().is("-"))) {
+      const Token where = now();
+      advance();
+      product();
+      emit_at(where, Op::kBinary, static_cast<int>(where.is("+") ? BinaryOp::kAdd : BinaryOp::kSubtract));
+    }
+  }
+  void product() {
+    sign();
+    while (!error_ && (now().is("*") || now().is("/") || now().is("%"))) {
+      const Token where = now();
+      advance();
+      sign();
+      const BinaryOp op = where.is("*") ? BinaryOp::kMultiply : where.is("/") ? BinaryOp::kDivide : BinaryOp::kModulo;
+      emit_at(where, Op::kBinary, static_cast<int>(op));
+    }
+  }
+  void sign() {
+    if (now().is("-") || now().is("+")) {
+      const Token where = now();
+      if (++nesting_ > kNestingMax) fail_here();
+      advance();
+      sign();
+      if (where.is("-")) emit_at(where, Op::kNegate);
+      --nesting_;
+      return;
+    }
+    element();
+  }
+  void element() {
+    primary();
+    while (!error_ && now().is("[")) {
+      const Token where = now();
+      advance();
+      expression();
+      expect("]");
+      emit_at(where, Op::kIndex);
+    }
+  }
+
+  void primary() {
+    const Token token = now();
+    switch (token.kind) {
+      case Kind::kInteger:
+      case Kind::kFloat:
+        advance();
+        return constant(number(token));
+      case Kind::kText:
+        advance();
+        return constant(token.text);
+      case Kind::kName:
+        return named(token);
+      case Kind::kSymbol:
+        if (accept("(")) {
+          expression();
+          return expect(")");
+        }
+        if (accept("[")) return list();
+        break;
+      default:
+        break;
+    }
+    fail_here();
+  }
+
+  Value number(const Token& token) {
+    const char* const begin = token.text.data();
+    const char* const end = begin + token.text.size();
+    if (token.kind == Kind::kInteger) {
+      std::int64_t integer = 0;
+      if (std::from_chars(begin, end, integer).ec == std::errc{} && integer <= INT32_MAX) return integer;
+    }
+    double real = 0;
+    std::from_chars(begin, end, real);
+    return real;
+  }
+
+  void list() {
+    int count = 0;
+    while (!error_ && !now().is("]")) {
+      expression();
+      ++count;
+      if (!accept(",")) break;
+    }
+    expect("]");
+    emit(Op::kMakeList, count);
+  }
+
+  void named(const Token& token) {
+    if (token.is("True") || token.is("False")) {
+      advance();
+      return constant(token.is("True"));
+    }
+    if (token.is("run")) return run_thread();
+    if (token.is("p") && ahead().is("[")) return pose(token);
+    if (ahead().is("(")) return call(token);
+    advance();
+    load(token);
+  }
+
+  /// p[x, y, z, rx, ry, rz]; with one value an element of a variable of that name.
+  void pose(const Token& token) {
+    advance();
+    advance();
+    const int begin = here();
+    int count = 0;
+    while (!error_ && !now().is("]")) {
+      expression();
+      ++count;
+      if (!accept(",")) break;
+    }
+    expect("]");
+    if (error_) return;
+    if (count == 6) {
+      emit_at(token, Op::kMakePose);
+    } else if (count == 1) {
+      std::vector<Instruction>& instructions = scopes_.back().function.instructions;
+      const std::vector<Instruction> index(instructions.begin() + begin, instructions.end());
+      if (std::ranges::any_of(index, [](const Instruction& i) { return i.op >= Op::kJump && i.op < Op::kPop; })) {
+        return fail(syntax_error(script_, token.line, token.column));
+      }
+      instructions.resize(static_cast<std::size_t>(begin));
+      load(token);
+      instructions.insert(instructions.end(), index.begin(), index.end());
+      emit_at(token, Op::kIndex);
+    } else {
+      fail(syntax_error(script_, token.line, token.column));
+    }
+  }
+
+  void run_thread() {
+    advance();
+    const Token name = now();
+    const auto found = function_numbers_.find(name.text);
+    if (name.kind != Kind::kName || found == function_numbers_.end()) return fail_name(name);
+    advance();
+    expect("(");
+    expect(")");
+    emit_at(name, Op::kRun, function_number(name.text, false));
+  }
+
+  void call(const Token& name) {
+    advance();
+    advance();
+    if (function_numbers_.contains(name.text)) return call_function(name);
+    const int builtin = find_builtin(name.text);
+    if (builtin < 0) return fail_name(name);
+    call_builtin(name, builtin);
+  }
+
+  void call_function(const Token& name) {
+    std::vector<Parameter> parameters;
+    for (const std::string& parameter : parameters_[name.text]) parameters.push_back({parameter, true, {}});
+    arguments(name, parameters);
+    emit_at(name, Op::kCall, function_number(name.text, false), static_cast<int>(parameters.size()));
+  }
+
+  void call_builtin(const Token& name, int builtin) {
+    const std::vector<Parameter> parameters = parameters_of(builtin);
+    arguments(name, parameters);
+    emit_at(name, Op::kCallBuiltin, builtin, static_cast<int>(parameters.size()));
+  }
+
+  /// Arguments by position or by name, and the defaults of the others, pushed in the order of the parameters.
+  void arguments(const Token& name, const std::vector<Parameter>& parameters) {
+    std::vector<std::vector<Instruction>> given(parameters.size());
+    std::size_t position = 0;
+    while (!error_ && !now().is(")")) {
+      std::size_t index = position++;
+      if (now().kind == Kind::kName && ahead().is("=")) {
+        const auto found = std::ranges::find(parameters, now().text, &Parameter::name);
+        index = static_cast<std::size_t>(found - parameters.begin());
+        advance();
+        advance();
+      }
+      if (index >= parameters.size() || !given[index].empty()) return fail_arguments(name);
+      given[index] = apart([this] { expression(); });
+      if (!accept(",")) break;
+    }
+    expect(")");
+    if (error_) return;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (!given[i].empty()) {
+        append(given[i]);
+      } else if (parameters[i].has_default) {
+        code_.constants.push_back(parameters[i].default_value);
+        emit_at(name, Op::kConstant, static_cast<int>(code_.constants.size()) - 1);
+      } else {
+        return fail_arguments(name);
+      }
+    }
+  }
+  void fail_arguments(const Token& name) {
+    fail({name.line, name.column, fmt::format("compile_error_wrong_arguments:{}:", name.text)});
+  }
+
+  /// Code that is moved to its place later: jumps in it are relative to its begin.
+  template <typename Emit>
+  std::vector<Instruction> apart(const Emit& emit_code) {
+    std::vector<Instruction>& instructions = scopes_.back().function.instructions;
+    const auto begin = static_cast<std::ptrdiff_t>(instructions.size());
+    emit_code();
+    std::vector<Instruction> taken(instructions.begin() + begin, instructions.end());
+    instructions.resize(static_cast<std::size_t>(begin));
+    for (Instruction& i : taken) {
+      if (i.op >= Op::kJump && i.op < Op::kPop) i.a -= static_cast<int>(begin);
+    }
+    return taken;
+  }
+  void append(const std::vector<Instruction>& code) {
+    const int begin = here();
+    for (Instruction i : code) {
+      if (i.op >= Op::kJump && i.op < Op::kPop) i.a += begin;
+      scopes_.back().function.instructions.push_back(i);
+    }
+  }
+
+  std::string_view script_;
+  std::vector<Token> tokens_;
+  std::size_t at_ = 0;
+  std::optional<ScriptError> error_;
+  Code code_;
+  std::vector<Scope> scopes_;
+  std::map<std::string, int> function_numbers_;                 ///< -1: not yet met
+  std::map<std::string, std::vector<std::string>> parameters_;  ///< of each function
+  std::map<std::string, int> global_numbers_;
+  int program_depth_ = 0;  ///< 1 where a `def` or `sec` holds everything
+  int nesting_ = 0;
+  std::size_t instructions_ = 0;
+};
+
+}  // namespace
+
+std::expected<Code, ScriptError> compile(std::string_view script) {
+  auto tokens = tokenize(script);
+  if (!tokens) return std::unexpected(tokens.error());
+  return Compiler(script, std::move(*tokens)).run();
+}
+
+}  // namespace firstlook::sim::ur::script

@@ -1,0 +1,77 @@
+#include "hal/sim/ur_controller/script/value.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace firstlook::sim::ur::script {
+namespace {
+
+void append(std::string& text, const Value& value) {
+  if (text.size() > kTextBytesMax) return;
+  if (const bool* b = value.as<bool>()) {
+    text += *b ? "True" : "False";
+  } else if (const auto* i = value.as<std::int64_t>()) {
+    text += std::to_string(*i);
+  } else if (const auto* d = value.as<double>()) {
+    text += fmt::format("{:.6g}", *d);
+  } else if (const auto* s = value.as<std::string>()) {
+    text += *s;
+  } else if (const auto* pose = value.as<PoseValue>()) {
+    text += 'p';
+    append(text, Value(list_of(pose->pose)));
+  } else if (const auto* list = value.as<List>()) {
+    text += '[';
+    for (const Value& element : *list) {
+      if (&element != &list->front()) text += ", ";
+      append(text, element);
+    }
+    text += ']';
+  } else {
+    text += value.empty() ? "None" : "thread";
+  }
+}
+
+}  // namespace
+
+Value::Value(List value) : content(std::move(value)) {
+  std::uint64_t sum = 1;
+  for (const Value& element : std::get<List>(content)) sum += element.weight;
+  weight = static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, UINT32_MAX));
+}
+
+double Value::number() const {
+  if (const auto* i = as<std::int64_t>()) return static_cast<double>(*i);
+  const auto* d = as<double>();
+  return d != nullptr ? *d : 0;
+}
+
+List list_of(const Vector6& values) {
+  List list;
+  for (const double value : values) list.emplace_back(value);
+  return list;
+}
+
+std::string text_of(const Value& value) {
+  std::string text;
+  append(text, value);
+  return text;
+}
+
+std::string_view type_name(const Value& value) {
+  constexpr std::string_view kNames[] = {"none", "bool", "int", "float", "string", "list", "pose", "thread"};
+  return kNames[value.content.index()];
+}
+
+bool equal(const Value& a, const Value& b) {
+  if (a.is_number() && b.is_number()) return a.number() == b.number();
+  if (a.content.index() != b.content.index()) return false;
+  if (const bool* flag = a.as<bool>()) return *flag == *b.as<bool>();
+  if (const auto* text = a.as<std::string>()) return *text == *b.as<std::string>();
+  if (const auto* pose = a.as<PoseValue>()) return pose->pose == b.as<PoseValue>()->pose;
+  if (const auto* thread = a.as<ThreadHandle>()) return thread->number == b.as<ThreadHandle>()->number;
+  if (const auto* list = a.as<List>()) return std::ranges::equal(*list, *b.as<List>(), equal);
+  return true;
+}
+
+}  // namespace firstlook::sim::ur::script

@@ -1,0 +1,85 @@
+#include "hal/sim/ur_controller/simulated_ur.hpp"
+
+#include "hal/sim/ur_controller/primary_packets.hpp"
+#include "platform/core/ensure.hpp"
+
+namespace firstlook::sim::ur {
+
+std::string_view name_of(Port port) {
+  switch (port) {
+    case Port::kDashboard:
+      return "dashboard";
+    case Port::kPrimary:
+      return "primary";
+    case Port::kSecondary:
+      return "secondary";
+    case Port::kRealtime:
+      return "realtime";
+    case Port::kRtde:
+      return "RTDE";
+    case Port::kPrimaryReadOnly:
+      return "primary, read-only";
+    case Port::kSecondaryReadOnly:
+      return "secondary, read-only";
+    case Port::kRealtimeReadOnly:
+      return "realtime, read-only";
+  }
+  return "";
+}
+
+SimulatedUr::SimulatedUr(const ControllerIdentity& identity, const SimulatedUrOptions& options)
+    : controller_(identity), programs_(controller_, options.programs) {
+  if (!options.running) return;
+  controller_.release_brakes();
+  while (controller_.state().robot_mode != RobotMode::kRunning) controller_.step();
+}
+
+void SimulatedUr::step() {
+  controller_.step();
+  programs_.step();
+  for (const ControllerEvent& event : controller_.events().take()) {
+    const std::string message = event_message(event);
+    for (StateSession* listener : event_listeners_) listener->on_event(message);
+  }
+  for (const std::unique_ptr<Session>& session : sessions_) session->on_cycle();
+}
+
+Session& SimulatedUr::open(Port port) {
+  const auto state_session = [&](bool read_only, bool primary) {
+    auto session = std::make_unique<StateSession>(controller_, programs_, read_only, primary);
+    event_listeners_.push_back(session.get());
+    return session;
+  };
+  std::unique_ptr<Session> session;
+  switch (port) {
+    case Port::kDashboard:
+      session = std::make_unique<DashboardSession>(controller_, programs_, dashboard_);
+      break;
+    case Port::kPrimary:
+    case Port::kPrimaryReadOnly:
+      session = state_session(port == Port::kPrimaryReadOnly, true);
+      break;
+    case Port::kSecondary:
+    case Port::kSecondaryReadOnly:
+      session = state_session(port == Port::kSecondaryReadOnly, false);
+      break;
+    case Port::kRealtime:
+    case Port::kRealtimeReadOnly:
+      session = std::make_unique<RealtimeSession>(controller_, programs_, port == Port::kRealtimeReadOnly);
+      break;
+    case Port::kRtde:
+      session = std::make_unique<RtdeSession>(controller_, owners_);
+      break;
+  }
+  ENSURE(5101, session != nullptr);
+  sessions_.push_back(std::move(session));
+  return *sessions_.back();
+}
+
+void SimulatedUr::close(Session& session) {
+  session.closed();
+  std::erase_if(event_listeners_, [&](const StateSession* listener) { return listener == &session; });
+  std::erase_if(sessions_, [&](const std::unique_ptr<Session>& held) { return held.get() == &session; });
+}
+
+}  // namespace firstlook::sim::ur

@@ -1,0 +1,61 @@
+/// A whole simulated UR controller: the robot, its program, and a session for each connection to each of its ports.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "hal/sim/ur_controller/dashboard_session.hpp"
+#include "hal/sim/ur_controller/rtde_session.hpp"
+#include "hal/sim/ur_controller/stream_sessions.hpp"
+
+namespace firstlook::sim::ur {
+
+enum class Port : std::uint16_t {
+  kDashboard = 29999,
+  kPrimary = 30001,
+  kSecondary = 30002,
+  kRealtime = 30003,
+  kRtde = 30004,
+  kPrimaryReadOnly = 30011,
+  kSecondaryReadOnly = 30012,
+  kRealtimeReadOnly = 30013,
+};
+inline constexpr std::array kPorts = {
+    Port::kDashboard, Port::kPrimary,         Port::kSecondary,         Port::kRealtime,
+    Port::kRtde,      Port::kPrimaryReadOnly, Port::kSecondaryReadOnly, Port::kRealtimeReadOnly};
+/// "dashboard", "primary", ...
+[[nodiscard]] std::string_view name_of(Port port);
+
+struct SimulatedUrOptions {
+  std::vector<StoredProgram> programs;  ///< that `load` finds
+  bool running = false;                 ///< starts with the brakes released instead of without power
+};
+
+class SimulatedUr {
+ public:
+  SimulatedUr(const ControllerIdentity& identity, const SimulatedUrOptions& options);
+
+  /// One control cycle of `cycle()`: robot, program, then what is due on every session.
+  void step();
+  [[nodiscard]] Duration cycle() const { return controller_.identity().cycle; }
+
+  /// A client connects. The session lives until `close`.
+  [[nodiscard]] Session& open(Port port);
+  void close(Session& session);
+
+  [[nodiscard]] Controller& controller() { return controller_; }
+  [[nodiscard]] Programs& programs() { return programs_; }
+  /// A client has sent `shutdown`.
+  [[nodiscard]] bool shutting_down() const { return dashboard_.shutting_down; }
+
+ private:
+  Controller controller_;
+  Programs programs_;
+  DashboardState dashboard_;
+  RtdeInputOwners owners_;
+  std::vector<std::unique_ptr<Session>> sessions_;
+  std::vector<StateSession*> event_listeners_;
+};
+
+}  // namespace firstlook::sim::ur

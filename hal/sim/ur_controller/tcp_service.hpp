@@ -1,0 +1,20 @@
+/// A simulated controller on TCP, in real time.
+#pragma once
+
+#include <string>
+
+#include "hal/sim/ur_controller/simulated_ur.hpp"
+
+namespace firstlook::sim::ur {
+
+struct TcpServiceOptions {
+  std::string host = "127.0.0.1";
+  int port_offset = 0;  ///< added to every port
+};
+
+/// Serves all ports until SIGINT, SIGTERM (see catch_stop_signals) or a client's `shutdown`; says on stderr which ports
+/// are ready. A client that does not read is dropped when 2 MiB wait for it. Error: kDeviceMissing for a port that
+/// cannot be had.
+[[nodiscard]] Status serve_on_tcp(SimulatedUr& robot, const TcpServiceOptions& options);
+
+}  // namespace firstlook::sim::ur

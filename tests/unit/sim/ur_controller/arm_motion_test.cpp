@@ -1,0 +1,193 @@
+#include "hal/sim/ur_controller/arm_motion.hpp"
+
+#include <catch2/catch.hpp>
+
+namespace firstlook {
+using namespace sim::ur;
+
+namespace {
+
+constexpr double kCycle_s = 0.002;
+
+struct Arm {
+  ArmModel model = *find_arm_model("ur5e");
+  ArmMotion motion{model, JointVector{0, -1.4, 1.6, -1.7, -1.5, 0}};  // far from singularities and limits
+  double slider = 1;
+  double fastest_rad_s = 0;
+
+  /// Steps until at rest; the time it took.
+  double run_until_rest(double limit_s = 60) {
+    double time_s = 0;
+    while (motion.busy() && time_s < limit_s) {
+      REQUIRE_FALSE(motion.step(kCycle_s, slider));
+      fastest_rad_s = std::max(fastest_rad_s, motion.velocity_rad_s().max_abs());
+      time_s += kCycle_s;
+    }
+    return time_s;
+  }
+  void run(double s) {
+    for (int i = 0; i < static_cast<int>(s / kCycle_s + 0.5); ++i) REQUIRE_FALSE(motion.step(kCycle_s, slider));
+  }
+  [[nodiscard]] JointVector ahead(double rad) const {
+    JointVector target = motion.position_rad();
+    target[0] += rad;
+    target[4] -= rad / 2;
+    return target;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("movej takes the time of its trapezoid, or the time that was asked for", "[ur]") {
+  Arm arm;
+  const JointVector target = arm.ahead(1);
+  const auto ticket = arm.motion.movej(target, 0.5, 1, 0);
+  CHECK_FALSE(arm.motion.done(ticket));
+  CHECK(arm.run_until_rest() == Approx(2.5).margin(0.003));  // 1 / 0.5 + 0.5 / 1
+  CHECK(arm.motion.done(ticket));
+  CHECK((arm.motion.position_rad() - target).max_abs() < 1e-12);
+  CHECK(arm.fastest_rad_s == Approx(0.5).margin(1e-6));
+
+  static_cast<void>(arm.motion.movej(arm.ahead(-1), 0.5, 4, 3));
+  CHECK(arm.run_until_rest() == Approx(3).margin(0.003));
+  static_cast<void>(arm.motion.movej(arm.ahead(1), 0.5, 0.1, 1));  // faster than the acceleration allows
+  CHECK(arm.run_until_rest() == Approx(1).margin(0.003));
+}
+
+TEST_CASE("movel keeps the flange on a straight line", "[ur]") {
+  Arm arm;
+  const Pose from = forward(arm.model, arm.motion.position_rad()).flange().pose();
+  Pose to = from;
+  to.translation() += Eigen::Vector3d(-0.05, 0.1, 0.08);
+  to.linear() = to.linear() * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const Eigen::Vector3d way = to.translation() - from.translation();
+  static_cast<void>(arm.motion.movel(to, 0.1, 0.5, 0));
+  double off_line_m = 0, time_s = 0;
+  while (arm.motion.busy()) {
+    REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
+    time_s += kCycle_s;
+    const Eigen::Vector3d at =
+        forward(arm.model, arm.motion.position_rad()).flange().translation() - from.translation();
+    off_line_m = std::max(off_line_m, (at - way * (at.dot(way) / way.squaredNorm())).norm());
+  }
+  CHECK(off_line_m < 1e-8);
+  CHECK(time_s == Approx(std::max(way.norm(), 0.2) / 0.1 + 0.1 / 0.5).margin(0.003));
+  const Pose reached = forward(arm.model, arm.motion.position_rad()).flange().pose();
+  CHECK((reached.matrix() - to.matrix()).norm() < 1e-7);
+}
+
+TEST_CASE("a line that leaves the reach is a fault, and the arm stands", "[ur]") {
+  Arm arm;
+  Pose to = forward(arm.model, arm.motion.position_rad()).flange().pose();
+  to.translation().x() += 2;
+  static_cast<void>(arm.motion.movel(to, 1, 2, 0));
+  std::optional<MotionFault> fault;
+  for (int i = 0; i < 5000 && !fault; ++i) fault = arm.motion.step(kCycle_s, 1);
+  REQUIRE(fault);
+  CHECK_FALSE(arm.motion.busy());
+  CHECK(arm.motion.standing());
+}
+
+TEST_CASE("the slider slows a path down without leaving it", "[ur]") {
+  Arm arm;
+  const JointVector from = arm.motion.position_rad(), target = arm.ahead(1);
+  arm.slider = 0.5;
+  arm.run(0.5);
+  static_cast<void>(arm.motion.movej(target, 0.5, 1, 0));
+  double off_path_rad = 0, time_s = 0;
+  while (arm.motion.busy()) {
+    if (time_s > 2) arm.slider = 0.25;
+    REQUIRE_FALSE(arm.motion.step(kCycle_s, arm.slider));
+    time_s += kCycle_s;
+    const JointVector way = arm.motion.position_rad() - from;
+    off_path_rad = std::max(off_path_rad, std::abs(way[4] + way[0] / 2));
+  }
+  CHECK(off_path_rad < 1e-12);
+  CHECK(time_s > 5);
+  CHECK(arm.motion.scale() == Approx(0.25));
+}
+
+TEST_CASE("a pause brakes on the path and a motion goes on from there", "[ur]") {
+  Arm arm;
+  const JointVector target = arm.ahead(1);
+  static_cast<void>(arm.motion.movej(target, 1, 2, 0));
+  arm.run(0.6);
+  arm.motion.hold(true);
+  arm.run(0.5);
+  CHECK(arm.motion.standing());
+  CHECK(arm.motion.busy());
+  const JointVector held = arm.motion.position_rad();
+  arm.run(5);
+  CHECK((arm.motion.position_rad() - held).max_abs() == 0);
+  arm.motion.hold(false);
+  arm.run_until_rest();
+  CHECK((arm.motion.position_rad() - target).max_abs() < 1e-12);
+}
+
+TEST_CASE("a stop brakes on the path and ends the motion", "[ur]") {
+  Arm arm;
+  const JointVector from = arm.motion.position_rad();
+  static_cast<void>(arm.motion.movej(arm.ahead(1), 1, 2, 0));
+  arm.run(0.7);
+  const double speed_rad_s = arm.motion.velocity_rad_s().max_abs(), at_rad = arm.motion.position_rad()[0];
+  static_cast<void>(arm.motion.stop(4));
+  arm.run_until_rest();
+  const JointVector way = arm.motion.position_rad() - from;
+  CHECK(way[4] == Approx(-way[0] / 2));
+  // Its own time slows down evenly, so the way is about that of an even deceleration.
+  CHECK(arm.motion.position_rad()[0] - at_rad == Approx(speed_rad_s * speed_rad_s / 8).epsilon(0.1));
+}
+
+TEST_CASE("speedj accelerates to its speed, stopj ends it", "[ur]") {
+  Arm arm;
+  JointVector speed = JointVector::zero(6);
+  speed[5] = 0.4;
+  arm.motion.speedj(speed, 1);
+  arm.run(0.2);
+  CHECK(arm.motion.velocity_rad_s()[5] == Approx(0.2).margin(1e-9));
+  arm.run(1);
+  CHECK(arm.motion.velocity_rad_s()[5] == Approx(0.4).margin(1e-9));
+  const auto ticket = arm.motion.stop(2);
+  CHECK(arm.run_until_rest() == Approx(0.2).margin(0.005));
+  CHECK(arm.motion.done(ticket));
+}
+
+TEST_CASE("servoj follows a moving target", "[ur]") {
+  Arm arm;
+  JointVector target = arm.motion.position_rad();
+  for (int i = 0; i < 1000; ++i) {
+    target[1] += 0.2 * kCycle_s;
+    arm.motion.servoj(target, 0.03);
+    REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
+  }
+  CHECK(target[1] - arm.motion.position_rad()[1] == Approx(0.2 * 0.03).margin(0.003));
+  for (int i = 0; i < 1000; ++i) REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
+  CHECK(arm.motion.position_rad()[1] == Approx(target[1]).margin(1e-6));
+}
+
+TEST_CASE("speedl moves the flange along its axis", "[ur]") {
+  Arm arm;
+  const Pose from = forward(arm.model, arm.motion.position_rad()).flange().pose();
+  arm.motion.speedl({0, 0, 0.05, 0, 0, 0}, 1);
+  arm.run(1);
+  const Pose to = forward(arm.model, arm.motion.position_rad()).flange().pose();
+  CHECK(to.translation().z() - from.translation().z() == Approx(0.05).margin(0.005));
+  CHECK(to.translation().x() == Approx(from.translation().x()).margin(1e-3));
+  CHECK((to.linear() - from.linear()).norm() < 0.01);
+}
+
+TEST_CASE("a joint that would leave its range is a fault", "[ur]") {
+  Arm arm;
+  JointVector at = arm.motion.position_rad();
+  at[5] = 6.2;
+  arm.motion.place(at);
+  JointVector speed = JointVector::zero(6);
+  speed[5] = 1;
+  arm.motion.speedj(speed, 5);
+  std::optional<MotionFault> fault;
+  for (int i = 0; i < 500 && !fault; ++i) fault = arm.motion.step(kCycle_s, 1);
+  CHECK(fault == MotionFault::kJointLimit);
+  CHECK(arm.motion.position_rad()[5] <= 6.2832);
+}
+
+}  // namespace firstlook

@@ -1,0 +1,530 @@
+#include <catch2/catch.hpp>
+
+#include "hal/sim/ur_controller/script/compiler.hpp"
+#include "tests/support/ur_robot.hpp"
+#include "tests/support/ur_wire.hpp"
+
+namespace firstlook {
+using namespace sim::ur;
+using namespace test;
+using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
+
+namespace {
+
+/// A robot with a client on its primary port.
+struct ScriptRobot : UrRobot {
+  Session& primary;
+  std::vector<std::string> texts, keys;
+  struct Exception {
+    int line, column;
+    std::string text;
+  };
+  std::vector<Exception> exceptions;
+
+  explicit ScriptRobot(const char* model = "ur5e") : UrRobot(model), primary(robot.open(Port::kPrimary)) {}
+
+  void send(const std::string& script, double run_s = 0.5) {
+    primary.receive(script);
+    listen(run_s);
+  }
+  void listen(double run_s) {
+    run(run_s);
+    for (const UrPacket& packet : take_packets(primary.output())) {
+      if (packet.type != 20) continue;
+      const std::string content = packet.content.substr(10);
+      if (packet.content[9] == 0) texts.push_back(content);
+      if (packet.content[9] == 7) keys.push_back(content.substr(9));
+      if (packet.content[9] == 10) exceptions.push_back({int_at(content, 0), int_at(content, 4), content.substr(8)});
+    }
+  }
+  /// What textmsg says of an expression.
+  std::string value(const std::string& expression) {
+    texts.clear();
+    exceptions.clear();
+    send("def f():\n  x = " + expression + "\n  textmsg(x)\nend\n", 0.1);
+    if (!exceptions.empty()) return "! " + exceptions[0].text;
+    REQUIRE(texts.size() == 1);
+    return texts[0];
+  }
+};
+
+}  // namespace
+
+TEST_CASE("expressions", "[ur][script]") {
+  ScriptRobot robot;
+  CHECK(robot.value("1 + 2 * 3 - 4") == "3");
+  CHECK(robot.value("(1 + 2) * 3") == "9");
+  CHECK(robot.value("7 / 2") == "3.5");
+  CHECK(robot.value("7 % 3") == "1");
+  CHECK(robot.value("-2 + 1.5") == "-0.5");
+  CHECK(robot.value("1e-3 * 2") == "0.002");
+  CHECK(robot.value("2147483647 + 1") == "-2147483648");
+  CHECK(robot.value("1 < 2 and not 2 <= 1") == "True");
+  CHECK(robot.value("False or 1 == 1.0") == "True");
+  CHECK(robot.value("True xor True") == "False");
+  CHECK(robot.value("False and 1/0 == 1") == "False");  // not evaluated
+  CHECK(robot.value("[1, 2.5, [True]]") == "[1, 2.5, [True]]");
+  CHECK(robot.value("[10, 20, 30][1]") == "20");
+  CHECK(robot.value("p[1,2,3,0,0,0.5]") == "p[1, 2, 3, 0, 0, 0.5]");
+  CHECK(robot.value("p[1,2,3,0,0,0.5][2]") == "3");
+  CHECK(robot.value("[1,2] == [1,2]") == "True");
+  CHECK(robot.value("\"a b\" != \"a\"") == "True");
+  CHECK(robot.value("str_cat(\"x\", 5)") == "x5");
+  CHECK(robot.value("sqrt(16) + floor(2.7) + pow(2, 3)") == "14");
+  CHECK(robot.value("r2d(atan2(1, 1))") == "45");
+  CHECK(robot.value("norm([3, 4])") == "5");
+  CHECK(robot.value("length([1,2,3])") == "3");
+  CHECK(robot.value("to_num(\"2.5\")") == "2.5");
+  CHECK(robot.value("str_find(\"hello\", \"l\")") == "2");
+  CHECK(robot.value("binary_list_to_integer([True, False, True])") == "5");
+  CHECK(robot.value("integer_to_binary_list(2)[1]") == "True");
+  CHECK_THAT(robot.value("1 / 0"), Contains("Division by zero"));
+  CHECK_THAT(robot.value("[1][1]"), Contains("out of bounds"));
+  CHECK_THAT(robot.value("\"a\" + 1"), Contains("Type error"));
+  CHECK_THAT(robot.value("sqrt(-1)"), StartsWith("!"));
+  CHECK_THAT(robot.value("textmsg(1)"), StartsWith("!"));  // has no value
+}
+
+TEST_CASE("poses", "[ur][script]") {
+  ScriptRobot robot;
+  CHECK(robot.value("pose_trans(p[1,0,0,0,0,1.5707963267948966], p[1,0,0,0,0,0])") == "p[1, 1, 0, 0, 0, 1.5708]");
+  CHECK(robot.value(
+            "point_dist(pose_trans(pose_inv(p[1,2,3,0.1,0.2,0.3]), p[1,2,3,0.1,0.2,0.3]), p[0,0,0,0,0,0]) < 1e-9") ==
+        "True");
+  CHECK(robot.value("pose_add(p[1,0,0,0,0,0], p[0,1,0,0,0,0])") == "p[1, 1, 0, 0, 0, 0]");
+  CHECK(robot.value("interpolate_pose(p[0,0,0,0,0,0], p[1,0,0,0,0,1], 0.5)") == "p[0.5, 0, 0, 0, 0, 0.5]");
+  CHECK(robot.value("rpy2rotvec([0.3, 0, 0])") == "[0.3, 0, 0]");
+  CHECK(robot.value("point_dist(get_forward_kin(), get_actual_tcp_pose()) < 1e-9") == "True");
+  CHECK(robot.value("norm(get_inverse_kin(get_actual_tcp_pose()) - get_actual_joint_positions()) < 1e-6") == "True");
+  CHECK(robot.value("get_inverse_kin_has_solution(p[5,0,0,0,0,0])") == "False");
+}
+
+TEST_CASE("control flow, functions and scopes", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def prog():
+  global total = 0
+  kept = 5
+  def add(n, twice):
+    local kept = n
+    if twice:
+      kept = kept * 2
+    elif n > 100:
+      return -1
+    else:
+      total = total + 1
+    end
+    total = total + kept
+    return total
+  end
+  i = 0
+  while True:
+    i = i + 1
+    if i == 2:
+      continue
+    end
+    if i > 4: # a comment
+      break
+    end
+    add(i, i == 3)
+  end
+  list = [1, 2, 3]
+  list[1] = 20
+  copy = list
+  copy[0] = 9
+  textmsg("total ", total)
+  textmsg("kept ", kept)
+  textmsg("list ", list)
+  textmsg("far ", add(101, False))
+end
+)");
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"total 13", "kept 5", "list [1, 20, 3]", "far -1"});
+  CHECK(robot.keys == std::vector<std::string>{"PROGRAM_XXX_STARTEDprog", "PROGRAM_XXX_STOPPEDprog"});
+  CHECK(robot.state().runtime == RuntimeState::kStopped);
+}
+
+TEST_CASE("what scripts of known clients rely on", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def prog():
+  global mode = 0
+  def greet(name, times=2, mark="!"):
+    return str_cat(str_cat(name, times), mark)
+  end
+  def declares():
+    global mode
+    mode = 7
+  end
+  textmsg(greet("a"))
+  textmsg(greet("b", mark="?"))
+  textmsg(greet("c", 3))
+  declares()
+  thread_move = 0
+  join thread_move
+  kill thread_move
+  if mode == 8 or
+    mode == 7:
+    textmsg("continued")
+  end
+  if 1.0 and thread_move != 1:
+    textmsg("number")
+  end
+  def scale(p, factor):
+    p[0] = p[0] * factor
+    return p
+  end
+  textmsg(scale(p[1, 2, 3, 0, 0, 0], 2))
+  global served = 0
+  thread server():
+    while True:
+      enter_critical
+      q = get_joint_positions()
+      servoj(q, t=get_steptime(), lookahead_time=0.03, gain=2000)
+      served = served + 1
+      exit_critical
+    end
+  end
+  thread_move = run server()
+  i = 0
+  while i < 20:
+    enter_critical
+    i = i + 1
+    sync()
+    exit_critical
+  end
+  textmsg(served > 10)
+  kill thread_move
+  stopj(4.0)
+  speedj([0, 0, 0, 0, 0, 0], 0, get_steptime())
+  movec(pose_add(get_actual_tcp_pose(), p[0, 0.01, 0.01, 0, 0, 0]), pose_add(get_actual_tcp_pose(), p[0, 0.02, 0, 0, 0, 0]))
+  textmsg("end")
+end
+)",
+             2);
+  for (const auto& exception : robot.exceptions) CHECK(exception.text.empty());
+  CHECK(robot.texts ==
+        std::vector<std::string>{"a2!", "b2?", "c3!", "continued", "number", "p[2, 2, 3, 0, 0, 0]", "True", "end"});
+}
+
+TEST_CASE("threads run beside each other and end with the program", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def prog():
+  global count = 0
+  thread counter():
+    while True:
+      count = count + 1
+      sync()
+    end
+  end
+  thread short():
+    sleep(0.1)
+    textmsg("short")
+  end
+  t = run counter()
+  s = run short()
+  join s
+  textmsg("joined")
+  kill t
+  last = count
+  sleep(0.1)
+  textmsg(last == count)
+  textmsg(last > 10)
+  u = run counter()
+end
+)",
+             1);
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"short", "joined", "True", "True"});
+  CHECK(robot.state().runtime == RuntimeState::kStopped);
+}
+
+TEST_CASE("what does not compile is told with its place, and the running program goes on", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("def runs():\n  while True:\n    sync()\n  end\nend\n");
+  REQUIRE(robot.state().runtime == RuntimeState::kPlaying);
+  robot.send("def bad():\n  x = 1\n  y = foo(x)\nend\n");
+  REQUIRE(robot.exceptions.size() == 1);
+  CHECK(robot.exceptions[0].text == "compile_error_name_not_found:foo:");
+  CHECK(robot.exceptions[0].line == 3);
+  CHECK(robot.exceptions[0].column == 7);
+  robot.send("def bad():\n  movej([0.5, -1], a=0.25, v=1.0):\nend\n");
+  REQUIRE(robot.exceptions.size() == 2);
+  CHECK(robot.exceptions[1].text == "syntax_error_on_line:2:  movej([0.5, -1], a=0.25, v=1.0)::");
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  for (const char* bad : {"def f():\n  return x\nend\n", "x = \"open\n", "movej()\n", "movej([0], q=1)\n", "break\n",
+                          "def f(:\nend\n", "sleep(1, 2)\n", "x = p[1,2]\n", "x = (1\n", "1 +\n", "x = $\n",
+                          "textmsg(1, s3=2)\n", "def f():\n  if True:\n    x = 1\n    end\n  end\n  end\nend\n"}) {
+    INFO(bad);
+    CHECK_FALSE(script::compile(bad));
+  }
+}
+
+TEST_CASE("a fault while it runs ends the program and is told with its place", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("def prog():\n  x = [1]\n  sync()\n  y = x[3]\nend\n");
+  REQUIRE(robot.exceptions.size() == 1);
+  CHECK(robot.exceptions[0].line == 4);
+  CHECK(robot.state().runtime == RuntimeState::kStopped);
+  CHECK(robot.keys.back() == "PROGRAM_XXX_STOPPEDprog");
+}
+
+TEST_CASE("a script moves the arm and a new one replaces it", "[ur][script]") {
+  ScriptRobot robot("ur5");
+  const Vector6 from = robot.state().q_rad;
+  robot.send(std::string("movej(") + script::text_of(script::Value(script::list_of(from))) + ", a=1, v=0.5)\n", 0.2);
+  CHECK(robot.exceptions.empty());
+  robot.send(
+      "def go():\n  q = get_actual_joint_positions()\n  q[0] = q[0] + 1\n  movej(q, a=1, v=0.5)\n"
+      "  textmsg(\"there\")\nend\n",
+      1.5);
+  CHECK(robot.state().qd_rad_s[0] == Approx(0.5));
+  CHECK(robot.state().script_line == 4);
+  CHECK(robot.texts.empty());
+  robot.send(std::string("def back():\n  movej(p[") + fmt::format("{}", fmt::join(robot.state().tcp_pose, ",")) +
+                 "], t=2)\nend\n",
+             5);
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts.empty());
+  CHECK(robot.keys == std::vector<std::string>{"PROGRAM_XXX_STARTEDunnamed", "PROGRAM_XXX_STOPPEDunnamed",
+                                               "PROGRAM_XXX_STARTEDgo", "PROGRAM_XXX_STOPPEDgo",
+                                               "PROGRAM_XXX_STARTEDback", "PROGRAM_XXX_STOPPEDback"});
+  CHECK(robot.state().q_rad[0] > from[0] + 0.4);
+  CHECK(robot.state().q_rad[0] < from[0] + 0.9);
+  CHECK(robot.state().runtime == RuntimeState::kStopped);
+}
+
+TEST_CASE("movel, servoj, speedj and stopj from a script", "[ur][script]") {
+  ScriptRobot robot;
+  const Vector6 pose = robot.state().tcp_pose;
+  robot.send(R"(def prog():
+  set_tcp(p[0, 0, 0.1, 0, 0, 0])
+  movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]), v=0.2)
+  textmsg("moved")
+  q = get_actual_joint_positions()
+  i = 0
+  while i < 250:
+    q[5] = q[5] + 0.001
+    servoj(q, lookahead_time=0.03)
+    i = i + 1
+  end
+  stopj(2)
+  textmsg("served")
+  speedj([0, 0, 0, 0, 0, 0.3], 1, 0.5)
+  textmsg("speed ", get_actual_joint_speeds()[5])
+  stopj(1)
+  textmsg(is_steady())
+end
+)",
+             6);
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"moved", "served", "speed 0.3", "True"});
+  CHECK(robot.state().tcp_pose[2] != pose[2]);
+}
+
+TEST_CASE("one thread moves the arm at a time", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def prog():
+  thread other():
+    speedj([0, 0, 0, 0, 0, 0.2], 1, 5)
+  end
+  run other()
+  sync()
+  sync()
+  stopj(1)
+end
+)");
+  REQUIRE(robot.exceptions.size() == 1);
+  CHECK(robot.exceptions[0].text == "Another thread is already controlling the robot");
+  robot.run(1);
+  CHECK(robot.robot.controller().motion().standing());
+}
+
+TEST_CASE("inputs, outputs and registers from a script", "[ur][script]") {
+  ScriptRobot robot;
+  robot.robot.controller().set_digital_input(3, true);
+  robot.robot.controller().inputs().integers[24] = -5;
+  robot.robot.controller().inputs().set_bit(70, true);
+  robot.send(R"(def prog():
+  set_standard_digital_out(1, True)
+  set_configurable_digital_out(2, True)
+  set_digital_out(8, True)
+  set_standard_analog_out(0, 0.5)
+  write_output_integer_register(3, read_input_integer_register(24) * 2)
+  write_output_float_register(4, 1.25)
+  write_output_boolean_register(65, read_input_boolean_register(70))
+  textmsg(get_standard_digital_in(3))
+  textmsg(get_digital_out(1))
+  set_payload(1.5, [0, 0, 0.02])
+end
+)");
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"True", "True"});
+  CHECK(robot.state().io.digital_outputs == ((1U << 1) | (1U << 10) | (1U << 16)));
+  CHECK(robot.state().io.analog_outputs[0] == Approx(12));
+  CHECK(robot.state().outputs.integers[3] == -10);
+  CHECK(robot.state().outputs.doubles[4] == 1.25);
+  CHECK(robot.state().outputs.bit(65));
+  CHECK(robot.state().payload.mass_kg == 1.5);
+  robot.send("set_standard_digital_out(9, True)\n");
+  CHECK(robot.exceptions.size() == 1);
+}
+
+TEST_CASE("a secondary program runs beside the program, and does not move", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("def runs():\n  while True:\n    sync()\n  end\nend\n");
+  robot.send("sec s():\n  set_digital_out(2, True)\nend\n");
+  CHECK(robot.state().io.output(2));
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  robot.send("sec s():\n  movej([0,0,0,0,0,0])\nend\n");
+  CHECK(robot.exceptions.size() == 1);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+}
+
+TEST_CASE("pause holds a program where it is", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("def prog():\n  sleep(1)\n  textmsg(\"done\")\nend\n", 0.5);
+  CHECK(robot.dashboard("pause") == "Pausing program");
+  robot.listen(5);
+  CHECK(robot.texts.empty());
+  CHECK(robot.dashboard("play") == "Starting program");
+  robot.listen(0.4);
+  CHECK(robot.texts.empty());
+  robot.listen(0.2);
+  CHECK(robot.texts == std::vector<std::string>{"done"});
+}
+
+TEST_CASE("a program may be without end, but not without bounds", "[ur][script]") {
+  ScriptRobot robot;
+  const auto fails_with = [&](const std::string& script, const std::string& text) {
+    robot.exceptions.clear();
+    robot.send(script, 4);
+    INFO(script);
+    REQUIRE(robot.exceptions.size() == 1);
+    CHECK_THAT(robot.exceptions[0].text, Contains(text));
+    CHECK(robot.state().runtime == RuntimeState::kStopped);
+  };
+  fails_with("def f():\n  while True:\n  end\nend\n", "too much behind");
+  fails_with("def f():\n  def g():\n    g()\n  end\n  g()\nend\n", "Stack overflow");
+  fails_with("def f():\n  x = [1]\n  while True:\n    x = [x, x]\n  end\nend\n", "Out of memory");
+  fails_with("def f():\n  x = \"ab\"\n  while True:\n    x = str_cat(x, x)\n  end\nend\n", "Out of memory");
+  fails_with("def f():\n  thread t():\n    sleep(9)\n  end\n  while True:\n    run t()\n  end\nend\n",
+             "Too many threads");
+  std::string deep = "x = ";
+  for (int i = 0; i < 100'000; ++i) deep += "(";
+  CHECK_FALSE(script::compile(deep + "1\n"));
+  deep = "x = ";
+  for (int i = 0; i < 100'000; ++i) deep += "not ";
+  CHECK_FALSE(script::compile(deep + "True\n"));
+  std::string many = "def f():\n";
+  for (int i = 0; i < 1000; ++i) many += std::string("  def g") + std::to_string(i) + "():\n";
+  CHECK_FALSE(script::compile(many));
+}
+
+TEST_CASE("the shortest sleep takes a cycle", "[ur][script]") {
+  ScriptRobot robot("ur5");
+  robot.send("def f():\n  i = 0\n  while i < 1000:\n    sleep(0.001)\n    i = i + 1\n  end\n  textmsg(i)\nend\n", 7.9);
+  CHECK(robot.texts.empty());
+  robot.listen(0.2);
+  CHECK(robot.texts == std::vector<std::string>{"1000"});
+  CHECK(robot.exceptions.empty());
+}
+
+TEST_CASE("scripts need a robot that runs", "[ur][script]") {
+  UrRobot robot("ur5e", false);
+  Session& primary = robot.robot.open(Port::kPrimary);
+  primary.receive("def f():\n  set_digital_out(0, True)\nend\n");
+  robot.run(0.2);
+  CHECK(robot.state().runtime == RuntimeState::kStopped);
+  CHECK_FALSE(robot.state().io.output(0));
+}
+
+namespace {
+
+/// The other end of a script's connections, in memory.
+class FakePeer final : public script::Sockets {
+ public:
+  bool reachable = true;
+  std::string sent, to_robot;
+  int closed = 0;
+  std::string host;
+
+  Id open(const std::string& to, std::uint16_t) override {
+    host = to;
+    return 1;
+  }
+  State state(Id) const override { return reachable ? State::kOpen : State::kClosed; }
+  bool send(Id, std::string_view bytes) override {
+    sent += bytes;
+    return true;
+  }
+  std::string& received(Id) override { return to_robot; }
+  void close(Id) override { ++closed; }
+};
+
+}  // namespace
+
+TEST_CASE("a script talks to another computer", "[ur][script]") {
+  FakePeer peer;
+  ScriptRobot robot;
+  robot.robot.programs().set_sockets(&peer);
+  peer.to_robot = std::string("\0\0\0\7\xff\xff\xff\xfe", 8);
+  robot.send(R"(def prog():
+  textmsg(socket_open("192.168.1.2", 50002, "pc"))
+  socket_send_string("request_program", "pc")
+  socket_send_byte(10, "pc")
+  socket_send_int(258, "pc")
+  textmsg(socket_read_binary_integer(2, "pc"))
+  textmsg(socket_read_line("pc", 0.2))
+  textmsg(socket_read_ascii_float(2, "pc", 0))
+  textmsg(socket_read_binary_integer(1, "pc", 0.1))
+  socket_close("pc")
+  textmsg(socket_send_line("x", "pc"))
+end
+)",
+             0.1);
+  CHECK(robot.exceptions.empty());
+  CHECK(peer.host == "192.168.1.2");
+  CHECK(peer.sent == std::string("request_program\n\0\0\1\2", 20));
+  peer.to_robot = "a line\r\n (1.5,";
+  robot.listen(0.1);
+  peer.to_robot += " -2)";
+  robot.listen(0.5);
+  CHECK(robot.texts == std::vector<std::string>{"True", "[2, 7, -2]", "a line", "[2, 1.5, -2]", "[0, 0]", "False"});
+  CHECK(peer.closed >= 1);
+  peer.reachable = false;
+  robot.texts.clear();
+  robot.send("textmsg(socket_open(\"10.0.0.1\", 1))\n", 3);
+  CHECK(robot.texts == std::vector<std::string>{"False"});
+  robot.robot.programs().set_sockets(nullptr);
+}
+
+TEST_CASE("External Control asks another computer for its program at Play", "[ur][script]") {
+  FakePeer peer;
+  UrRobot with_program("ur5e", true, {{"external_control.urp", "", {"10.0.0.2", 50002}}});
+  with_program.robot.programs().set_sockets(&peer);
+  CHECK_THAT(with_program.dashboard("load external_control.urp"), StartsWith("Loading program"));
+  CHECK(with_program.dashboard("play") == "Starting program");
+  with_program.run(0.1);
+  CHECK(peer.host == "10.0.0.2");
+  CHECK(peer.sent == "request_program\n");
+  CHECK(with_program.state().runtime == RuntimeState::kStopped);
+  peer.to_robot = "set_digital_out(3, True)\nwhile True:\n";
+  with_program.run(0.3);
+  peer.to_robot = "  sync()\nend\n";
+  with_program.run(0.3);
+  CHECK(with_program.state().runtime == RuntimeState::kStopped);  // more could come
+  with_program.run(0.4);
+  CHECK(with_program.state().runtime == RuntimeState::kPlaying);
+  CHECK(with_program.state().io.output(3));
+  CHECK(with_program.dashboard("stop") == "Stopped");
+  with_program.run(0.1);
+
+  // Nobody answers: nothing starts.
+  CHECK(with_program.dashboard("play") == "Starting program");
+  with_program.run(3);
+  CHECK(with_program.state().runtime == RuntimeState::kStopped);
+  CHECK(with_program.dashboard("stop") == "Failed to execute: stop");
+  with_program.robot.programs().set_sockets(nullptr);
+}
+
+}  // namespace firstlook
