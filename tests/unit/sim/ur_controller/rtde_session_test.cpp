@@ -175,6 +175,9 @@ TEST_CASE("inputs take effect: slider, outputs under their masks, registers", "[
   CHECK(robot.state().io.analog_outputs[0] == Approx(12));  // 4 to 20 mA
   CHECK(robot.state().io.analog_outputs[1] == Approx(5));   // 0 to 10 V
   CHECK(robot.state().io.analog_types == 0b1000);
+  CHECK(client.send(rtde('U', std::string("\3\x01\x01", 3) + big_endian(0.1) + big_endian(0.9))).empty());
+  CHECK(robot.state().io.analog_outputs[0] == Approx(1));
+  CHECK(robot.state().io.analog_outputs[1] == Approx(5));  // not under the mask
 
   CHECK(client
             .send(rtde('U', std::string("\4") + big_endian(0x80000001, 4) + std::string("\1") + big_endian(42, 4) +
