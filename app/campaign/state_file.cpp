@@ -111,7 +111,7 @@ Result<StateText> parse_state(std::string_view text, std::string_view name) {
       whole = cell.has_value();
       if (whole) state.cells.push_back(std::move(*cell));
     }
-    if (!whole && (!last || end != std::string_view::npos)) {
+    if (!whole && (!last || (line_number == 1 && end != std::string_view::npos))) {
       return line_number == 1
                  ? failure(
                        Fault::kDataMalformed,

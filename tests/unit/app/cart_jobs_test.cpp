@@ -426,6 +426,7 @@ TEST_CASE("a depth picture that repeats itself is frozen, one with hardly a retu
 TEST_CASE("the voxels that a look hit take the colours of the frame beside it", "[jobs][planes]") {
   Bench bench(std::nullopt, "none", "color,sensor");
   bench.calibrate();
+  bench.depth().wall_m = 0.6;  // inside the map
   const MapPlanes& planes = bench.bench().planes();
   const auto colored = [&] {
     std::size_t count = 0;

@@ -74,8 +74,8 @@ Config all_changed() {
                    "runs/first: one/hand_eye.yaml",
                    4};
   c.depth = {"stereo", 0.4, 6, 3.5, 0.001, 0.003, 0.06, 4, 0.03, 5};
-  c.map = {0.02, {-1, -1, 0},    {1, 1, 1},       60,   30,   0.002,           "clear_when_corroborated",
-           0.01, {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, -0.8, 0.03, "earlier/map.ot"};
+  c.map = {0.02, {-1, -1, 0},    {1, 1, 1},       60,   30,   0.002,         "clear_when_corroborated",
+           0.01, {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, -0.8, 0.03, "color,label", "earlier/map.ot"};
   c.explore = {61, 401, 2001, 9, 3, "thesis2014"};
   c.clearance = {0.001, 0.002, 0.03, 4};
   c.memory = {512};

@@ -72,8 +72,8 @@ TEST_CASE("result.json keeps its schema", "[report]") {
   CHECK(hand_eye["covariance"].size() == 36);
   CHECK(hand_eye["reasons"].is_array());
 
-  CHECK(keys_of(json["mapping"]) == Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "fine", "holes",
-                                         "occupied_forgotten", "remaining", "prior", "objects"});
+  CHECK(keys_of(json["mapping"]) == Keys{"views", "resolution_m", "voxels", "grid_voxels", "frames", "planes", "fine",
+                                         "holes", "occupied_forgotten", "remaining", "prior", "objects"});
   CHECK(keys_of(json["mapping"]["prior"]) == Keys{"still_occupied", "newly_occupied", "gone", "still_free",
                                                   "unseen_occupied", "unseen_free", "first_known"});
   CHECK(json["mapping"]["prior"]["gone"] == 75);
