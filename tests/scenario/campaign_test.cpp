@@ -149,7 +149,7 @@ TEST_CASE("what a campaign refuses", "[scenario]") {
   CHECK(folder.read("c/cells.jsonl") == before);
 
   folder.options.file_bytes_max = 20'000;  // the runs' files do not fit, the campaign's own do
-  CHECK_THAT(refused(words("2", "full"), 3), Contains("E1002") && Contains("seed 3"));
+  CHECK_THAT(refused(words("1", "full"), 3), Contains("E1002") && Contains("seed 3"));
   CHECK(cells_in(folder, "full/cells.jsonl").empty());
 }
 
