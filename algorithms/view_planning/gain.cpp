@@ -14,6 +14,7 @@ namespace {
 constexpr std::uint8_t kUnknownWeight = 4;
 constexpr std::uint8_t kAgainWeight = 1;
 constexpr std::uint8_t kPass = 0;
+constexpr std::size_t kTile = 8;  // neighbouring rays that follow each other (GainRays)
 
 /// Free in the map, but motion cannot use it: seen from one pose only, in part (but not beside a surface), doubted by
 /// the latest frame, or so long ago that it soon cannot.
@@ -186,10 +187,9 @@ bool GainModel::is_backed(const VoxelMap& map, const Eigen::Vector3d& from_m, co
 std::uint32_t GainModel::count_backed(const ViewContext& context, const Transform<Base, Depth>& base_T_depth,
                                       const GainRays& rays, GainScratch& scratch) const {
   if (backed_only_m_.isEmpty()) return 0;
-  constexpr std::size_t kStride = 4;  // of the rays, which stand in tiles: a quarter of them finds what is worth a look
   const Eigen::Vector3d eye = base_T_depth.translation();
   std::uint32_t counted = 0;
-  for (std::size_t r = 0; r < rays.ends_m.size(); r += kStride) {
+  for (std::size_t r = 0; r < rays.ends_m.size(); r += kTile) {  // that finds what is worth a look
     for (const std::uint32_t i : pass_with_backing(context, eye, base_T_depth * rays.ends_m[r], rays.ends_m[r].z()))
       counted += scratch.mark(i) ? 1U : 0U;
   }
@@ -216,9 +216,13 @@ const GainRays& GainModel::returning_rays(const Transform<Base, Depth>& base_T_d
                                           GainWorker& worker) const {
   const Eigen::Vector3d eye = base_T_depth.translation();
   worker.returning.ends_m.clear();
-  for (const Eigen::Vector3d& end : rays.ends_m) {
-    const Eigen::Vector3d far_end = base_T_depth * Eigen::Vector3d(end * (sensor_.range_max_m / end.norm()));
-    if (!far_.is_open(eye, far_end)) worker.returning.ends_m.push_back(end);
+  // A tile is as wide as the cells of far_ are from a few metres: one of its rays speaks for it.
+  for (std::size_t first = 0; first < rays.ends_m.size(); first += kTile) {
+    const auto tile = std::span(rays.ends_m).subspan(first, std::min(kTile, rays.ends_m.size() - first));
+    const Eigen::Vector3d& middle = tile[tile.size() / 2];
+    const Eigen::Vector3d far_end = base_T_depth * Eigen::Vector3d(middle * (sensor_.range_max_m / middle.norm()));
+    if (!far_.is_open(eye, far_end))
+      worker.returning.ends_m.insert(worker.returning.ends_m.end(), tile.begin(), tile.end());
   }
   return worker.returning;
 }

@@ -10,8 +10,8 @@
 namespace firstlook {
 
 /// Chapter 11 of the thesis states the first part and leaves the second open: there stand our choices, each with its
-/// reason. The sweep before and the checks of every path are ours. Frames on the way are not used (the thesis's sensor was
-/// off while a map was loaded), and rays meet unknown space within reach alone, as in the thesis's virtual wall.
+/// reason. The sweep before and the checks of every path are ours. Frames on the way are not used (the thesis's sensor
+/// was off while a map was loaded), and rays meet unknown space within reach alone, as in the thesis's virtual wall.
 struct ThesisOptions {
   std::uint64_t seed = 1;
   std::uint32_t step = 0;  ///< number of this choice: other poses each time
