@@ -142,6 +142,18 @@ void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, H
   }
   if (static_cast<double>(gated) > limits.gated_views_max * static_cast<double>(result.fits.size())) {
     reasons.push_back(fmt::format("{} of {} views contradict the others", gated, result.fits.size()));
+  } else if (gated > limits.gated_at_end_max) {
+    // In the order in which they were taken.
+    const auto used = [](const ViewFit& f) { return f.used; };
+    const auto first_used = std::ranges::find_if(result.fits, used);
+    const auto before = std::distance(result.fits.begin(), first_used);
+    const auto last_used = std::find_if(result.fits.rbegin(), result.fits.rend(), used);
+    const auto after = std::distance(result.fits.rbegin(), last_used);
+    if (before == gated || after == gated) {
+      reasons.push_back(fmt::format(
+          "the {} {} of {} views contradict all others: the board, or the camera on the arm, was moved in between",
+          after == gated ? "last" : "first", gated, result.fits.size()));
+    }
   }
   if (result.holdout_rms_m == 0) {
     reasons.emplace_back("too few views to hold any out");

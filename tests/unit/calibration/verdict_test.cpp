@@ -115,6 +115,46 @@ TEST_CASE("a view that the solve left out is not held out, either, and the other
   CHECK(*result->holdout_px[11] == Approx(by_hand_px).epsilon(0.3));
 }
 
+TEST_CASE("a board that moves before the last views, or after the first, is no calibration, however few they are",
+          "[calibration]") {
+  Setup moved;
+  moved.base_T_board.translation() += Eigen::Vector3d(0.02, -0.01, 0.01);
+  for (const std::size_t views_after : {1, 2, 3}) {
+    for (const bool at_the_end : {true, false}) {
+      const Setup setup;
+      Random random(40 + views_after);
+      auto views = test::observe_views(setup, 16 - static_cast<int>(views_after), random);
+      const auto others = test::observe_views(moved, static_cast<int>(views_after), random);
+      views.insert(at_the_end ? views.end() : views.begin(), others.begin(), others.end());
+      INFO(views_after << (at_the_end ? " last" : " first"));
+      for (const int allowed : {0, 1}) {
+        HandEyeOptions options;
+        options.limits.gated_at_end_max = allowed;
+        const auto result = calibrate_hand_eye(setup.camera, setup.board, views, options);
+        REQUIRE(result);
+        const bool accepts = views_after <= static_cast<std::size_t>(allowed);
+        CHECK((result->verdict == Verdict::kAccepted) == accepts);
+        if (!accepts) {
+          REQUIRE_FALSE(result->reasons.empty());
+          CHECK_THAT(result->reasons[0], Catch::Contains(at_the_end ? "last" : "first") && Catch::Contains("moved"));
+        }
+      }
+    }
+  }
+  // Wrong views in between are left out, as before.
+  const Setup setup;
+  Random random(47);
+  auto views = test::observe_views(setup, 16, random);
+  const auto others = test::observe_views(moved, 2, random);
+  views[5] = others[0], views[9] = others[1];
+  HandEyeOptions options;
+  options.limits.gated_at_end_max = 0;
+  const auto result = calibrate_hand_eye(setup.camera, setup.board, views, options);
+  REQUIRE(result);
+  CHECK(result->verdict == Verdict::kAccepted);
+  CHECK(result->views == 14);
+}
+
 TEST_CASE("pose pairs: no pixels, the same verdicts", "[calibration]") {
   const Setup setup;
   Random random(23);
