@@ -175,7 +175,10 @@ class DepthFrame {
   }
 
   /// Of what is not negative; the library's functions cost a call for each pixel.
-  static double rounded(double value) { return static_cast<double>(static_cast<std::int64_t>(value + 0.5)); }
+  static double rounded(double value) {
+    const double raised = value + 0.5;
+    return static_cast<double>(static_cast<std::int64_t>(raised));
+  }
 
   [[nodiscard]] std::uint16_t quantised_mm(double measured_m) const {
     if (measured_m < sensor_.range_min_m || measured_m > sensor_.range_max_m) return 0;
