@@ -530,7 +530,8 @@ class Compiler {
     return real;
   }
 
-  void list() {
+  /// Expressions up to the closing bracket; how many.
+  int elements() {
     int count = 0;
     while (!error_ && !now().is("]")) {
       expression();
@@ -538,8 +539,10 @@ class Compiler {
       if (!accept(",")) break;
     }
     expect("]");
-    emit(Op::kMakeList, count);
+    return count;
   }
+
+  void list() { emit(Op::kMakeList, elements()); }
 
   void named(const Token& token) {
     if (token.is("True") || token.is("False")) {
@@ -558,13 +561,7 @@ class Compiler {
     advance();
     advance();
     const int begin = here();
-    int count = 0;
-    while (!error_ && !now().is("]")) {
-      expression();
-      ++count;
-      if (!accept(",")) break;
-    }
-    expect("]");
+    const int count = elements();
     if (error_) return;
     if (count == 6) {
       emit_at(token, Op::kMakePose);
