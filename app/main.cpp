@@ -347,10 +347,11 @@ int run_ur_sim(const UrSimCommand& command) {
   catch_stop_signals();
   const Status served = sim::ur::serve_on_tcp(robot, {command.host, command.port_offset});
   if (served) return kDone;
-  std::fprintf(stderr,
-               "firstlook: E%d %s\n  What to do: end the program that has the port, or choose another --port-offset or "
-               "--host; ports below 1024 need root.\n",
-               static_cast<int>(served.error().fault), std::string(served.error().detail()).c_str());
+  std::fprintf(
+      stderr,
+      "firstlook: E%d %s\n      Give --host an address of this computer; a port that is taken: end the program "
+      "that has it, or choose another --port-offset. Ports below 1024 need root.\n",
+      static_cast<int>(served.error().fault), std::string(served.error().detail()).c_str());
   return exit_code_of(served.error());
 }
 
