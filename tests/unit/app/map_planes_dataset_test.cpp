@@ -1,12 +1,9 @@
 /// `firstlook map --planes`: colours from rgb.txt, labels, sensors; and what is wrong with recordings of colours.
 #include <fmt/format.h>
 #include <png.h>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
-#include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "app/cli/export_command.hpp"
@@ -15,6 +12,7 @@
 #include "app/dataset/dataset_mapping.hpp"
 #include "app/report/picture_bytes.hpp"
 #include "platform/linux/files.hpp"
+#include "tests/support/printed_map.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace firstlook {
@@ -22,15 +20,13 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
+using test::print_map;
+using test::Printed;
+using test::read_text;
 
 constexpr int kWidth = 32, kHeight = 24;
 
 void write_text(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
-
-std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 void write_depth(const fs::path& file, std::uint16_t value) {
   const std::vector<std::uint16_t> pixels(static_cast<std::size_t>(kWidth) * kHeight, value);
@@ -92,24 +88,13 @@ struct Recording {
   }
 };
 
-struct Printed {
-  int exit_code = 0;
-  std::string text;
+struct PrintedJson : Printed {
   [[nodiscard]] Json json() const { return Json::parse(text); }
 };
 
-Printed run(MapCommandOptions options, const fs::path& scratch) {
+PrintedJson run(MapCommandOptions options, const fs::path& scratch) {
   options.json = true;
-  Printed printed;
-  std::fflush(stdout);
-  const int saved = dup(STDOUT_FILENO);
-  REQUIRE(std::freopen((scratch / "stdout").c_str(), "w", stdout) != nullptr);
-  printed.exit_code = run_map_command(options);
-  std::fflush(stdout);
-  dup2(saved, STDOUT_FILENO);
-  close(saved);
-  printed.text = read_text(scratch / "stdout");
-  return printed;
+  return {print_map(options, scratch)};
 }
 
 MapCommandOptions with_planes(const fs::path& dataset, const std::string& planes) {
@@ -235,7 +220,7 @@ TEST_CASE("a frame whose picture is broken is mapped without colours", "[app][da
   const std::string whole = read_text(data.at / "rgb/2.png");
   for (const std::string& broken : {std::string("no picture"), whole.substr(0, whole.size() / 2), std::string()}) {
     write_text(data.at / "rgb/2.png", broken);
-    const Printed printed = run(with_planes(data.at, "color"), data.at);
+    const PrintedJson printed = run(with_planes(data.at, "color"), data.at);
     REQUIRE(printed.exit_code == 0);
     const Json result = printed.json();
     CHECK(result["frames"].size() == 2);

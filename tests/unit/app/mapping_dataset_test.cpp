@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <octomap/octomap.h>
 #include <png.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -18,20 +17,19 @@
 #include <string>
 
 #include "app/cli/map_command.hpp"
+#include "tests/support/printed_map.hpp"
 
 namespace firstlook {
 namespace {
 
 namespace fs = std::filesystem;
+using test::print_map;
+using test::Printed;
+using test::read_text;
 
 constexpr int kWidth = 32, kHeight = 24;
 
 void write_text(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
-
-std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 // A PNG of one value, 16-bit grey unless told otherwise.
 // The lower half may have another value.
@@ -98,25 +96,6 @@ struct SmallDataset {
     return dataset ? "read without error" : std::string(dataset.error().detail());
   }
 };
-
-// What a command writes to stdout, and its exit code.
-struct Printed {
-  int exit_code = 0;
-  std::string text;
-};
-
-Printed run(const MapCommandOptions& options, const fs::path& scratch) {
-  Printed printed;
-  std::fflush(stdout);
-  const int saved = dup(STDOUT_FILENO);
-  REQUIRE(std::freopen((scratch / "stdout").c_str(), "w", stdout) != nullptr);
-  printed.exit_code = run_map_command(options);
-  std::fflush(stdout);
-  dup2(saved, STDOUT_FILENO);
-  close(saved);
-  printed.text = read_text(scratch / "stdout");
-  return printed;
-}
 
 // The folder of recorded data, where there is one.
 fs::path data_folder() {
@@ -309,7 +288,7 @@ TEST_CASE("map prints counts that add up and writes files that OctoMap reads", "
   options.datasets = {data.folder};
   options.out = data.folder / "out";
   options.json = true;
-  const Printed printed = run(options, data.folder);
+  const Printed printed = print_map(options, data.folder);
   REQUIRE(printed.exit_code == 0);
   const nlohmann::json result = nlohmann::json::parse(printed.text);
   CHECK(result["frames"].size() == 2);
@@ -328,7 +307,7 @@ TEST_CASE("map prints counts that add up and writes files that OctoMap reads", "
   CHECK(tree.isNodeOccupied(wall));
   CHECK(read_text(options.out / "map.ply").starts_with("ply\n"));
   CHECK(read_text(options.out / "map.ot").starts_with("# Octomap OcTree file\n"));
-  CHECK(run(options, data.folder).text == printed.text);  // the same bytes again
+  CHECK(print_map(options, data.folder).text == printed.text);  // the same bytes again
 }
 
 TEST_CASE("map tells usage from data by its exit code", "[app][map_command][hostile]") {
@@ -336,7 +315,7 @@ TEST_CASE("map tells usage from data by its exit code", "[app][map_command][host
   data.write();
   MapCommandOptions options;
   options.datasets = {data.folder};
-  const auto exit_code = [&] { return run(options, data.folder).exit_code; };
+  const auto exit_code = [&] { return print_map(options, data.folder).exit_code; };
   CHECK(exit_code() == 0);
   for (const double bad : {0.0, -0.05, 1e-9, 7.0, std::nan("")}) {
     options.resolution_m = bad;
@@ -383,7 +362,7 @@ TEST_CASE("frames that cannot be are refused and counted, the others are mapped"
   options.datasets = {data.folder};
   options.out = data.folder / "out";
   options.json = true;
-  const Printed printed = run(options, data.folder);
+  const Printed printed = print_map(options, data.folder);
   REQUIRE(printed.exit_code == 0);
   const nlohmann::json result = nlohmann::json::parse(printed.text);
   CHECK(result["frames"].size() == 3);
@@ -404,7 +383,7 @@ TEST_CASE("frames that cannot be are refused and counted, the others are mapped"
   clean.write();
   options.datasets = {clean.folder};
   options.out = clean.folder / "out";
-  REQUIRE(run(options, clean.folder).exit_code == 0);
+  REQUIRE(print_map(options, clean.folder).exit_code == 0);
   CHECK(read_text(clean.folder / "out/map.ot") == read_text(data.folder / "out/map.ot"));
   const std::string csv = read_text(data.folder / "out/frames.csv");
   CHECK(csv.starts_with("frame,line,stamp_s,image,unknown,free,occupied,points,refused\n"));
@@ -415,7 +394,7 @@ TEST_CASE("frames that cannot be are refused and counted, the others are mapped"
   data.camera_info += "depth_scale: 5\n";  // wrong by 1000: a wall 1 km away would clear everything
   data.write();
   options.datasets = {data.folder};
-  CHECK(run(options, data.folder).exit_code == 3);
+  CHECK(print_map(options, data.folder).exit_code == 3);
 }
 
 TEST_CASE("saturated pixels clear nothing", "[app][map_command][hostile]") {
@@ -425,7 +404,7 @@ TEST_CASE("saturated pixels clear nothing", "[app][map_command][hostile]") {
   MapCommandOptions options;
   options.datasets = {data.folder};
   options.json = true;
-  const nlohmann::json result = nlohmann::json::parse(run(options, data.folder).text);
+  const nlohmann::json result = nlohmann::json::parse(print_map(options, data.folder).text);
   const nlohmann::json pixels = result["frames"][1]["pixels"];
   CHECK(pixels["saturated"] == kWidth * kHeight / 2);
   CHECK(pixels["used"] == kWidth * kHeight / 2);
@@ -439,7 +418,7 @@ TEST_CASE("a place is told with its class, its frames and its neighbours", "[app
   options.datasets = {data.folder};
   options.json = true;
   options.at = "0.02,0.02,1.02";
-  const auto place = [&] { return nlohmann::json::parse(run(options, data.folder).text)["place"]; };
+  const auto place = [&] { return nlohmann::json::parse(print_map(options, data.folder).text)["place"]; };
   nlohmann::json wall = place();
   CHECK(wall["class"] == "occupied");
   CHECK(wall["log_odds"].get<double>() == Approx(2 * 0.8473).margin(1e-3));
@@ -463,7 +442,7 @@ TEST_CASE("a place is told with its class, its frames and its neighbours", "[app
   CHECK(outside["seen"]["frames"] == 0);
   for (const std::string bad : {"1,2", "1,2,3,4", "a,b,c", "1,2,nan", "1,2,1e99", ","}) {
     options.at = bad;
-    CHECK(run(options, data.folder).exit_code == 2);
+    CHECK(print_map(options, data.folder).exit_code == 2);
   }
 }
 
@@ -474,7 +453,7 @@ TEST_CASE("a stored map is read, asked and changed", "[app][map_command][octomap
   options.datasets = {data.folder};
   options.out = data.folder / "out";
   options.objects = true;
-  REQUIRE(run(options, data.folder).exit_code == 0);
+  REQUIRE(print_map(options, data.folder).exit_code == 0);
   CHECK(fs::file_size(data.folder / "out/objects.png") > 1000);
 
   MapCommandOptions stored;
@@ -482,7 +461,7 @@ TEST_CASE("a stored map is read, asked and changed", "[app][map_command][octomap
   stored.json = true;
   stored.objects = true;
   stored.at = "0.02,0.02,1.02";
-  nlohmann::json result = nlohmann::json::parse(run(stored, data.folder).text);
+  nlohmann::json result = nlohmann::json::parse(print_map(stored, data.folder).text);
   CHECK(result["objects"].size() == 1);
   CHECK(result["objects"][0]["shape"] == "plane");
   CHECK(result["place"]["class"] == "occupied");
@@ -490,7 +469,7 @@ TEST_CASE("a stored map is read, asked and changed", "[app][map_command][octomap
 
   stored.moves = {"1,0,0,0.5"};
   stored.out = data.folder / "moved";
-  result = nlohmann::json::parse(run(stored, data.folder).text);
+  result = nlohmann::json::parse(print_map(stored, data.folder).text);
   CHECK(result["place"]["class"] == "unknown");
   octomap::OcTree tree(0.1);
   REQUIRE(tree.readBinary((stored.out / "collision_map.bt").string()));
@@ -504,13 +483,13 @@ TEST_CASE("a stored map is read, asked and changed", "[app][map_command][octomap
   stored.out.clear();
   stored.from = data.folder / "moved/map.ot";
   stored.prior = data.folder / "out/collision_map.bt";
-  result = nlohmann::json::parse(run(stored, data.folder).text);
+  result = nlohmann::json::parse(print_map(stored, data.folder).text);
   CHECK(result["prior"]["gone"] == 0);
   CHECK(result["prior"]["unseen_occupied"] == result["objects"][0]["voxels"]);
   CHECK(result["prior"]["first_known"] == result["objects"][0]["voxels"]);
   for (const std::string bad : {"7,0,0,1", "0,0,0,1", "1.5,0,0,1", "1,0,0", "1,0,0,nan", "x"}) {
     stored.moves = {bad};
-    CHECK(run(stored, data.folder).exit_code == 2);
+    CHECK(print_map(stored, data.folder).exit_code == 2);
   }
 }
 
@@ -524,7 +503,7 @@ TEST_CASE("real Kinect frames give OctoMap's classes voxel for voxel", "[app][ma
   MapCommandOptions options;
   options.datasets = {folder};
   options.out = scratch.folder / "out";
-  REQUIRE(run(options, scratch.folder).exit_code == 0);
+  REQUIRE(print_map(options, scratch.folder).exit_code == 0);
   std::unique_ptr<octomap::AbstractOcTree> read(octomap::AbstractOcTree::read((options.out / "map.ot").string()));
   const auto* ours = dynamic_cast<octomap::OcTree*>(read.get());
   REQUIRE(ours != nullptr);
