@@ -4,7 +4,7 @@ export JOBS
 ARGS ?=
 ONLY ?=
 .DEFAULT_GOAL := build
-.PHONY: build run test test-asan bench format tidy deps clean help
+.PHONY: build run test test-asan bench deb format tidy deps clean help
 
 help: ## this list
 	@echo 'make                   build/release/firstlook'
@@ -33,6 +33,10 @@ bench: ## figures against their peers, into build/bench.json; ONLY=calibration|i
 format: ## clang-format everything in place
 	@toolchain/install-dependencies check
 	@toolchain/format
+
+deb: deps ## build/firstlook_VERSION_ARCH.deb: program, service, rules for cameras and CAN
+	@toolchain/build release firstlook packaging_texts
+	@toolchain/package
 
 tidy: ## clang-tidy; FILES="a.cpp b.cpp" for some
 	@toolchain/install-dependencies check

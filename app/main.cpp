@@ -13,6 +13,7 @@
 #include "app/cli/cli.hpp"
 #include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
+#include "app/report/checkpoint.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"
 #include "app/shell/calibration_recording.hpp"
@@ -29,6 +30,8 @@
 
 namespace firstlook {
 namespace {
+
+constexpr const char* kRunsFolder = "runs";  // where runs go that name no folder
 
 enum ExitCode { kDone = 0, kUsage = 2, kData = 3, kDevice = 4, kRejected = 5, kStopped = 6, kInternal = 70 };
 
@@ -60,7 +63,7 @@ int exit_code_of(const Ending& ending) {
 }
 
 int fail(const Error& error) {
-  std::fprintf(stderr, "firstlook: %s\n", describe(error).c_str());
+  std::fprintf(stderr, "%sfirstlook: %s\n", is_system_journal(2) ? "<3>" : "", describe(error).c_str());
   return exit_code_of(error);
 }
 
@@ -242,6 +245,17 @@ Result<std::optional<StoredCalibration>> stored_calibration(RunScope scope, cons
   return std::optional(*read);
 }
 
+/// With --resume: the run that a power cut ended between its calibration and its end, if there is one.
+std::optional<CutOffRun> run_to_resume(const RunCommand& command, Narrator& narrator) {
+  if (!command.resume || command.scope != RunScope::kEverything) return std::nullopt;
+  std::optional<CutOffRun> cut_off = newest_cut_off_run(kRunsFolder);
+  if (cut_off) {
+    narrator.line(fmt::format("{} was cut off after its calibration: Play tests that calibration and maps",
+                              cut_off->folder));
+  }
+  return cut_off;
+}
+
 int run_job(const RunCommand& command) {
   auto loaded = load_config(command.sources);
   if (!loaded) return fail(loaded.error());
@@ -252,10 +266,12 @@ int run_job(const RunCommand& command) {
   } else {
     narrator.line(fmt::format("running in the simulated cell {}", config.cell));
   }
-  const auto stored = stored_calibration(command.scope, config);
+  auto stored = stored_calibration(command.scope, config);
   if (!stored) return fail(stored.error());
+  std::optional<CutOffRun> resumed = run_to_resume(command, narrator);
+  if (resumed) *stored = resumed->calibration;
   const std::string folder =
-      command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
+      command.out.empty() ? fmt::format("{}/{}-{}", kRunsFolder, utc_date_for_name(), config.seed) : command.out;
   if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
 
   std::vector<NamedTarget> boards;  // load_config has refused what is no board
@@ -268,18 +284,27 @@ int run_job(const RunCommand& command) {
 
   if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
   const CartDevices devices{world.arm(), world.color(), world.depth(), world.pendant(), world.panel()};
-  const CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored};
+  CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored};
   CartOptions options;
-  options.scope = command.scope;
+  options.scope = resumed ? RunScope::kMap : command.scope;
   options.real_time = command.real_time;
   options.journal_path = folder + "/journal.flj";
   std::int64_t boot_heap_bytes = 0;
-  auto cart = [&] {
+  const auto make_cart = [&] {
     const memory::JobHeapScope boot(memory::kHeapUncapped);
     auto made = Cart::make(config, options, facts, devices, narrator);
     boot_heap_bytes = boot.outstanding_bytes();
     return made;
-  }();
+  };
+  auto cart = make_cart();
+  if (!cart && resumed && cart.error().fault == Fault::kStoredCalibration) {
+    narrator.line(fmt::format("not taken up: {}", describe(cart.error())), Priority::kWarning);
+    remove_checkpoint(resumed->folder);
+    resumed.reset();
+    facts.stored.reset();
+    options.scope = command.scope;
+    cart = make_cart();
+  }
   if (!cart) return fail(cart.error());
 
   const KnownFree known_free((*cart)->published());
@@ -304,6 +329,9 @@ int run_job(const RunCommand& command) {
   if (const Status written = write_run_files(folder, record, (*cart)->map_files()); !written) {
     return fail(written.error());
   }
+  remove_checkpoint(folder);
+  // Taken up and brought to its end; one that was stopped is offered again.
+  if (resumed && record.outcome != Outcome::kSafelyStopped) remove_checkpoint(resumed->folder);
   narrator.line(fmt::format("report    {}/report.html", folder));
   if (command.json) std::printf("%s", result_json(record).c_str());
   return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());

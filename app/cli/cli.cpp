@@ -96,6 +96,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
   run_app->add_flag("--record", run.record,
                     "keep the views of the board as a dataset that `firstlook calibrate` reads");
+  run_app->add_flag("--resume", run.resume,
+                    "take up the newest run below runs/ that was cut off after its calibration: test that calibration, "
+                    "then map; without one, the whole job");
   run_app->add_flag("--real-time", run.real_time, "at the pace of the clock instead of virtual time");
   run_app->add_flag("--json", run.json, "print result.json on stdout at the end");
 

@@ -26,6 +26,7 @@ struct RunCommand {
   bool real_time = false;
   bool json = false;
   bool record = false;
+  bool resume = false;
   std::string out;  ///< empty: runs/<date>-<seed>
   std::string faults;
 };

@@ -35,6 +35,11 @@ std::size_t run(const JobRequest& request, std::span<std::byte> bytes, std::uint
 
 }  // namespace
 
+void CartJobs::tell_if_accepted() const {
+  const auto& hand_eye = bench_.hand_eye();
+  if (accepted_ && hand_eye && hand_eye->verdict == Verdict::kAccepted) accepted_();
+}
+
 std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> result) noexcept {
   Workbench& b = bench_;
   switch (static_cast<JobKind>(request.kind)) {
@@ -56,7 +61,11 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
     case JobKind::kSolve:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.solve(); });
     case JobKind::kValidate:
-      return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.validate(); });
+      return run<NoArguments>(request, result, failed_, [&](const NoArguments&) {
+        const ValidateResult validated = b.validate();
+        tell_if_accepted();
+        return validated;
+      });
     case JobKind::kIntegrate:
       return run<IntegrateArguments>(request, result, failed_,
                                      [&b](const IntegrateArguments& a) { return b.integrate(a); });
@@ -72,8 +81,11 @@ std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> re
     case JobKind::kVerifyCalibration:
       return run<NoArguments>(request, result, failed_, [&b](const NoArguments&) { return b.verify_calibration(); });
     case JobKind::kTouchTest:
-      return run<TouchTestArguments>(request, result, failed_,
-                                     [&b](const TouchTestArguments& a) { return b.touch_test(a); });
+      return run<TouchTestArguments>(request, result, failed_, [&](const TouchTestArguments& a) {
+        const TouchTestResult touched = b.touch_test(a);
+        tell_if_accepted();
+        return touched;
+      });
     case JobKind::kColorLook:
       return run<ColorArguments>(request, result, failed_, [&b](const ColorArguments& a) { return b.color_look(a); });
     case JobKind::kSummarize:

@@ -11,8 +11,28 @@
 namespace firstlook {
 namespace {
 
-/// This run's calibration; of a stored one the same again, with the verdict of its test.
-StoredCalibration stored_form(const RunRecord& record) {
+std::vector<NamedFile> files_of_run(const RunRecord& record) {
+  std::vector<NamedFile> files;
+  if (record.hand_eye) files = calibration_files(calibration_of_run(record));
+  if (record.intrinsics.width > 0) files.push_back({"camera_info.yaml", camera_info_yaml(record.intrinsics)});
+  return files;
+}
+
+std::vector<NamedFile> files_of_map(const MapFiles& map) {
+  std::vector<NamedFile> files;
+  if (!map.fine_map_bt.empty()) files.push_back({"fine_map.bt", map.fine_map_bt});
+  if (!map.collision_map_bt.empty()) files.push_back({"collision_map.bt", map.collision_map_bt});
+  if (!map.map_ot.empty()) files.push_back({"map.ot", map.map_ot});
+  if (!map.color_map_ot.empty()) files.push_back({"color_map.ot", map.color_map_ot});
+  if (!map.map_ply.empty()) files.push_back({"map.ply", map.map_ply});
+  if (map.occupied.empty()) return files;
+  for (NamedFile& file : ros_scene_files(map.occupied)) files.push_back({"ros/" + file.name, std::move(file.text)});
+  return files;
+}
+
+}  // namespace
+
+StoredCalibration calibration_of_run(const RunRecord& record) {
   if (record.verified) {
     StoredCalibration c = record.verified->calibration;
     c.accepted = c.accepted && record.hand_eye->verdict == Verdict::kAccepted;
@@ -35,27 +55,6 @@ StoredCalibration stored_form(const RunRecord& record) {
   c.depth_offset = stored(record.alignment->depth_stamps);
   return c;
 }
-
-std::vector<NamedFile> files_of_run(const RunRecord& record) {
-  std::vector<NamedFile> files;
-  if (record.hand_eye) files = calibration_files(stored_form(record));
-  if (record.intrinsics.width > 0) files.push_back({"camera_info.yaml", camera_info_yaml(record.intrinsics)});
-  return files;
-}
-
-std::vector<NamedFile> files_of_map(const MapFiles& map) {
-  std::vector<NamedFile> files;
-  if (!map.fine_map_bt.empty()) files.push_back({"fine_map.bt", map.fine_map_bt});
-  if (!map.collision_map_bt.empty()) files.push_back({"collision_map.bt", map.collision_map_bt});
-  if (!map.map_ot.empty()) files.push_back({"map.ot", map.map_ot});
-  if (!map.color_map_ot.empty()) files.push_back({"color_map.ot", map.color_map_ot});
-  if (!map.map_ply.empty()) files.push_back({"map.ply", map.map_ply});
-  if (map.occupied.empty()) return files;
-  for (NamedFile& file : ros_scene_files(map.occupied)) files.push_back({"ros/" + file.name, std::move(file.text)});
-  return files;
-}
-
-}  // namespace
 
 Status check_run_folder(const std::string& folder) {
   const Result<bool> empty = folder_is_empty(folder);

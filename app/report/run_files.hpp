@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "algorithms/mapping/voxel_map.hpp"
+#include "app/dataset/hand_eye_file.hpp"
 #include "app/report/run_record.hpp"
 #include "platform/core/result.hpp"
 
@@ -19,6 +20,10 @@ struct MapFiles {
   std::string fine_map_bt;
   std::vector<AxisBox> occupied;  ///< merge_occupied of the map, base frame: becomes ros/*.scene, once for each frame
 };
+
+/// A run's calibration as hand_eye.yaml says it; of a stored one the same again, with the verdict of its test.
+/// `record.hand_eye` is set.
+[[nodiscard]] StoredCalibration calibration_of_run(const RunRecord& record);
 
 /// Whether a run may write there; makes nothing, so that a run that does not start leaves nothing behind.
 /// @return kOutputNotEmpty when it exists and is not empty, kDiskWrite when it is no folder or cannot be read

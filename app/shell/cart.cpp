@@ -9,6 +9,7 @@
 #include "algorithms/mapping/ply_writer.hpp"
 #include "app/cli/small_commands.hpp"
 #include "app/config/load_config.hpp"
+#include "app/report/checkpoint.hpp"
 #include "app/report/color_picture.hpp"
 #include "app/report/done_text.hpp"
 #include "app/report/object_picture.hpp"
@@ -21,6 +22,8 @@
 
 namespace firstlook {
 namespace {
+
+constexpr double kEndingWithin_s = 120;  // for the report's files; a slow disk takes some seconds
 
 /// Phases that result.json names: the outermost states, those within Running, and the parts of Calibrate and Conclude
 /// instead of these two. Explore stays whole: its parts last for seconds and come back for every view.
@@ -82,7 +85,7 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   } else {
     cart->clock_ = std::make_unique<VirtualClock>();
   }
-  cart->jobs_ = std::make_unique<CartJobs>(*cart->bench_);
+  cart->jobs_ = std::make_unique<CartJobs>(*cart->bench_, [raw = cart.get()] { raw->checkpoint_calibration(); });
   cart->runner_ = std::make_unique<JobRunner>(*cart->jobs_, *cart->clock_,
                                               options.real_time ? JobMode::kThreaded : JobMode::kVirtual);
   cart->loop_.reset(new EventLoop(*cart->clock_, cart->journal_.get(), *cart, cart->timers_, *cart->runner_));
@@ -91,7 +94,7 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   EventSource* const sources[] = {&*cart->arm_source_,    &cart->color_source_, &cart->depth_source_,
                                   &cart->pendant_source_, &cart->panel_source_, &cart->host_};
   for (EventSource* source : sources) cart->loop_->add_source(*source);
-  cart->loop_->set_watchdog(&cart->watchdog_);
+  cart->loop_->set_watchdog(cart->status_.watchdog());
   cart->machine_.emplace(machine_settings(cart->config_, options.scope), cart->decisions_);
   auto share = memory::PoolShare::take(memory::Pool::kApplication, sizeof(Cart));
   if (!share) return std::unexpected(share.error());
@@ -109,6 +112,7 @@ Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& 
       depth_source_(devices.depth),
       pendant_source_(devices.pendant, OperatorDevice::kPendant),
       panel_source_(devices.panel, OperatorDevice::kPanel),
+      status_(config.cell),
       decisions_(*this, this),
       started_(utc_date_text()),
       wall_start_s_(static_cast<double>(monotonic_ns()) * 1e-9) {}
@@ -127,6 +131,11 @@ Status Cart::run() {
   loop_.reset();
   job_heap_peak_bytes_ = runner_->counters().heap_peak_bytes;
   runner_.reset();  // waits for a job that still works on what the record is made of
+  status_.ending(seconds(kEndingWithin_s));
+  if (checkpoint_failure_) {
+    narrator_.line(fmt::format("warning   no checkpoint of the calibration: {}", describe(*checkpoint_failure_)),
+                   Priority::kWarning);
+  }
   if (const Status closed = journal_->close(now); !closed) return closed;
   return status;
 }
@@ -170,6 +179,7 @@ void Cart::decision(DecisionKind kind, Instant now, std::span<const std::byte> b
 
 void Cart::state_entered(Instant now, StateId state) {
   if (!is_phase(state)) return;
+  status_.state(state_row(state).name, state == StateId::kReady);
   if (!phases_.empty() && !ended_) phases_.back().end = now;
   if (!phases_.full() && !ended_) phases_.push_back({state, now, now});
   std::array<char, 96> line;
@@ -192,6 +202,14 @@ void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<
   submit(kind, number, arguments, now);
 }
 
+void Cart::checkpoint_calibration() {
+  RunRecord record;
+  fill_calibration(record);
+  const std::string folder = std::filesystem::path(options_.journal_path).parent_path().string();
+  if (const Status written = write_checkpoint(folder, calibration_of_run(record)); !written)
+    checkpoint_failure_ = written.error();
+}
+
 void Cart::submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now) {
   request_.kind = static_cast<std::uint16_t>(kind);
   request_.number = number;
@@ -209,6 +227,7 @@ void Cart::cancel_timer(Instant, MachineTimer timer) { timers_.cancel(static_cas
 
 void Cart::show(Instant now, std::string_view text) {
   devices_.pendant.show(text);
+  status_.text(text);
   std::array<char, 128> line;
   const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s]   {}", now.seconds(), text);
   const std::string_view shown(line.data(), std::min(end.size, line.size()));
@@ -229,6 +248,11 @@ void Cart::forget_known_free(Instant now) {
 
 void Cart::stop_recorded(Instant now, Fault cause) {
   if (!stops_.full()) stops_.push_back({now, cause});
+  status_.fault(cause);
+  std::array<char, 160> line;
+  const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s]   E{} {}", now.seconds(),
+                                    static_cast<int>(cause), fault_row(cause).text);
+  narrator_.line({line.data(), std::min(end.size, line.size())}, Priority::kWarning);
 }
 
 void Cart::finished(Instant now, const Ending& ending) {
@@ -305,6 +329,15 @@ std::vector<MapPicture> Cart::with_map_pictures(Draw draw) const {
                                bench_->board_outlines_m()});
 }
 
+void Cart::fill_calibration(RunRecord& record) const {
+  record.hand_eye = bench_->hand_eye();
+  record.solver = config_.calibration.solver;
+  record.intrinsics = bench_->camera();
+  record.alignment = bench_->alignment();
+  record.verified = bench_->verified();
+  record.provenance.arm_model = config_.arm.model;
+}
+
 RunRecord Cart::record() const {
   RunRecord r;
   r.outcome = ending_.outcome;
@@ -314,14 +347,10 @@ RunRecord Cart::record() const {
     r.phases.push_back({std::string(state_row(phase.state).name), phase.start.seconds(), phase.end.seconds()});
   }
   r.decisions_hash = hash_text(journal_->decisions_hash());
-  r.hand_eye = bench_->hand_eye();
-  r.solver = config_.calibration.solver;
-  r.intrinsics = bench_->camera();
+  fill_calibration(r);
   if (bench_->targets().size() > 1) {
     for (const NamedTarget& target : bench_->targets()) r.target_names.push_back(target.name);
   }
-  r.alignment = bench_->alignment();
-  r.verified = bench_->verified();
   r.calibration_views = bench_->calibration_records();
   if (bench_->mapped()) {
     r.mapping = mapping_record();
@@ -340,7 +369,6 @@ RunRecord Cart::record() const {
   for (const MotionStop& stop : stops_) r.faults.push_back({stop.time.seconds(), stop.cause, ""});
   r.memory = memory_record();
   r.provenance.version = version_text();
-  r.provenance.arm_model = config_.arm.model;
   r.provenance.config_yaml = print_config(config_);
   r.wall = wall_record();
   r.reason = reason_text(r, ending_);

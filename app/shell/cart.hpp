@@ -12,6 +12,7 @@
 #include "app/report/run_record.hpp"
 #include "app/shell/decision_log.hpp"
 #include "app/shell/device_sources.hpp"
+#include "app/shell/service_status.hpp"
 #include "platform/journal/journal.hpp"
 #include "platform/linux/terminal.hpp"
 #include "platform/loop/event_loop.hpp"
@@ -90,10 +91,13 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   void on_event(const Event& event) override;
   void end_of_turn(Instant now) override;
 
+  /// On the job's thread, before the machine hears of it: from here on a power cut does not lose the calibration.
+  void checkpoint_calibration();
   void submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now);
   /// Counts the time in which the arm stands and the machine waits for a job.
   void note_waiting(Instant now);
 
+  void fill_calibration(RunRecord& record) const;
   [[nodiscard]] MappingRecord mapping_record() const;
   [[nodiscard]] SafetyRecord safety_record() const;
   [[nodiscard]] MemoryRecord memory_record() const;
@@ -112,7 +116,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   std::unique_ptr<JobRunner> runner_;
   std::unique_ptr<JournalWriter> journal_;
   TimerQueue timers_;
-  CountingWatchdog watchdog_;
+  ServiceStatus status_;
   std::unique_ptr<EventLoop> loop_;
   std::optional<ArmSource> arm_source_;
   FrameSource<ColorFrameArrived> color_source_;
@@ -126,6 +130,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   memory::PoolShare share_;  ///< of the memory page, for the cart itself
 
   // What the report tells.
+  std::optional<Error> checkpoint_failure_;  ///< of a job's thread; read after the loop has ended
   FixedVector<PhasePassed, 128> phases_;
   FixedVector<MotionStop, 128> stops_;
   Ending ending_{Outcome::kFaulted, true, Fault::kInternal};

@@ -8,7 +8,9 @@ constexpr double kPressWithin_s = 60;  // of Play, safety rule 6
 
 void enter_ready(Machine& m) {
   m.light(hal::Light::kGreen);
-  if (!m.finished()) m.show("ready: press Play on the pendant");
+  if (m.finished()) return;
+  const bool stored = m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
+  m.show(stored ? "ready: Play tests the stored calibration" : "ready: press Play on the pendant");
 }
 
 Handled on_ready(Machine& m, const MachineEvent& event) {

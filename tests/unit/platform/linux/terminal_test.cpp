@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -69,4 +70,31 @@ TEST_CASE("on a terminal the progress line is rewritten and gives way to lines t
   CHECK_FALSE(color_wanted(terminal));
   close(terminal);
   close(master);
+}
+
+TEST_CASE("lines for the system's journal have their priority, and only when it is the journal that reads") {
+  int ends[2];
+  REQUIRE(pipe(ends) == 0);
+  struct stat file {};
+  REQUIRE(fstat(ends[1], &file) == 0);
+  const auto stream = [&](unsigned long long inode) {
+    return std::to_string(file.st_dev) + ":" + std::to_string(inode);
+  };
+  setenv("JOURNAL_STREAM", stream(file.st_ino).c_str(), 1);
+  CHECK(is_system_journal(ends[1]));
+  {
+    Narrator narrator(ends[1]);
+    narrator.line("sweep");
+    narrator.line("E5002 lost the link", Priority::kWarning);
+    narrator.line("E1000", Priority::kError);
+  }
+  setenv("JOURNAL_STREAM", stream(file.st_ino + 1).c_str(), 1);
+  CHECK_FALSE(is_system_journal(ends[1]));
+  setenv("JOURNAL_STREAM", "nonsense", 1);
+  CHECK_FALSE(is_system_journal(ends[1]));
+  unsetenv("JOURNAL_STREAM");
+  CHECK_FALSE(is_system_journal(ends[1]));
+  CHECK(read_all(ends[0]) == "<6>sweep\n<4>E5002 lost the link\n<3>E1000\n");
+  close(ends[0]);
+  close(ends[1]);
 }

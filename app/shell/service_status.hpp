@@ -1,0 +1,48 @@
+/// What a job tells those who look at it from outside while it runs: the service manager, and programs that read
+/// $RUNTIME_DIRECTORY/status.json. Outside of a service it tells nobody.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "platform/core/fault_table.hpp"
+#include "platform/core/time.hpp"
+#include "platform/linux/notify.hpp"
+#include "platform/linux/status_file.hpp"
+
+namespace firstlook {
+
+/// After construction nothing here allocates or blocks.
+class ServiceStatus {
+ public:
+  /// Reads what systemd sets: NOTIFY_SOCKET, WATCHDOG_USEC with WATCHDOG_PID, RUNTIME_DIRECTORY.
+  /// @param cell_or_robot  what the job works on, for the file
+  explicit ServiceStatus(std::string_view works_on);
+
+  /// The first time that the job is ready the service manager learns that the service has started.
+  void state(std::string_view name, bool ready);
+  void text(std::string_view line);
+  void fault(Fault fault);
+  /// The loop has ended and feeds no watchdog; files are being written, for which the manager allows this long.
+  void ending(Duration allowed);
+
+  /// To be fed by the loop; null when nobody asked for it.
+  [[nodiscard]] Watchdog* watchdog() { return watchdog_ ? &*watchdog_ : nullptr; }
+
+ private:
+  void publish();
+
+  ServiceManager manager_;
+  std::optional<ServiceWatchdog> watchdog_;
+  StatusFile file_;
+  std::string works_on_;
+  std::string started_;
+  std::array<char, 32> state_{};
+  std::array<char, 160> text_{};
+  int fault_ = 0;
+  bool told_ready_ = false;
+};
+
+}  // namespace firstlook

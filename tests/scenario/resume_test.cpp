@@ -1,0 +1,62 @@
+/// A power cut after the calibration: the next start says what it has and goes on from there, never by itself.
+#include <csignal>
+
+#include "tests/support/job_run.hpp"
+
+namespace firstlook {
+using Catch::Matchers::Contains;
+using test::check_safe;
+using test::JobFolder;
+using test::Json;
+using test::ProgramResult;
+
+namespace {
+constexpr const char* kOtherArm = R"(arm: ur5e
+walls: {low_m: [-2.0, -1.9], high_m: [2.1, 2.0], height_m: 2.6}
+board: {center_m: [0.89, 0.45, 0.42], faces: [-0.89, -0.45, 0.35]}
+)";
+}  // namespace
+
+TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
+  JobFolder folder;
+  folder.options.signal_at = "sweep view 3";
+  folder.options.signal = SIGKILL;
+  const ProgramResult killed = folder.run_job("runs/first");
+  REQUIRE(killed.exit_code == 128 + SIGKILL);
+  folder.options.signal_at.clear();
+  CHECK_FALSE(std::filesystem::exists(folder / "runs/first/result.json"));
+  REQUIRE(std::filesystem::exists(folder / "runs/first/checkpoint.yaml"));
+
+  SECTION("tested first, then mapped; afterwards it is not offered again") {
+    const ProgramResult resumed = folder.run_job("runs/second", {"--resume"});
+    INFO(resumed.err);
+    CHECK(resumed.exit_code == 0);
+    CHECK_THAT(resumed.err, Contains("runs/first was cut off after its calibration") &&
+                                Contains("ready: Play tests the stored calibration"));
+    const Json result = folder.read_json("runs/second/result.json");
+    check_safe(result);
+    CHECK(result["hand_eye"]["source"] == "stored");
+    CHECK(result["hand_eye"]["verification"]["views"].get<int>() >= 3);
+    CHECK(result["mapping"]["views"].size() > 10);
+    CHECK_FALSE(std::filesystem::exists(folder / "runs/first/checkpoint.yaml"));
+    CHECK_FALSE(std::filesystem::exists(folder / "runs/second/checkpoint.yaml"));
+    const ProgramResult fresh = folder.run_job("third", {"--resume", "--faults", "operator.stop_at=5"});
+    CHECK_THAT(fresh.err, !Contains("cut off"));
+  }
+  SECTION("stopped before its end it is offered again") {
+    const ProgramResult stopped = folder.run_job("runs/second", {"--resume", "--faults", "operator.stop_at=30"});
+    INFO(stopped.err);
+    CHECK(stopped.exit_code == 6);
+    CHECK(std::filesystem::exists(folder / "runs/first/checkpoint.yaml"));
+  }
+  SECTION("of another arm it is not taken: the whole job is done") {
+    folder.write("cell.yaml", kOtherArm);
+    const ProgramResult resumed = folder.run({"run", "--cell", "cell.yaml", "--seed", "1", "--sensor", "fast", "--out",
+                                              "runs/second", "--resume", "--faults", "operator.stop_at=5"});
+    INFO(resumed.err);
+    CHECK_THAT(resumed.err, Contains("not taken up") && Contains("LocateBoard") && !Contains("VerifyCalibration"));
+    CHECK_FALSE(std::filesystem::exists(folder / "runs/first/checkpoint.yaml"));
+  }
+}
+
+}  // namespace firstlook
