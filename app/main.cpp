@@ -250,8 +250,8 @@ std::optional<CutOffRun> run_to_resume(const RunCommand& command, Narrator& narr
   if (!command.resume || command.scope != RunScope::kEverything) return std::nullopt;
   std::optional<CutOffRun> cut_off = newest_cut_off_run(kRunsFolder);
   if (cut_off) {
-    narrator.line(fmt::format("{} was cut off after its calibration: Play tests that calibration and maps",
-                              cut_off->folder));
+    narrator.line(
+        fmt::format("{} was cut off after its calibration: Play tests that calibration and maps", cut_off->folder));
   }
   return cut_off;
 }

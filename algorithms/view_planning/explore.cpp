@@ -15,10 +15,13 @@ constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each ca
 // Targets keep this beside the clearance: the next frame may take a little away from where the arm stands (FACTS 3:
 // states with less than 1 mm trap the arm).
 constexpr double kTargetMargin_m = 0.005;
+constexpr std::uint64_t kRefineStream = 4600ULL << 40;
+constexpr double kAside_rad = 0.12;   // standard deviation of each joint in a step of refinement
+constexpr double kBackMax = 0.4;      // of the way to where the arm is, in every other step
 constexpr double kNearby_rad = 0.35;  // standard deviation of each joint around an earlier view
 constexpr double kHereShare = 0.25;   // of those: around where the arm is, which has just seen something new
 constexpr int kAimedTries = 10;       // for one of another source: most are given up before they cost anything
-constexpr int kInVainMax = 6;         // views in a row that make room for motion, and nothing comes of it
+constexpr int kInVainMax = 2;         // views in a row that make room for motion, and nothing comes of it
 constexpr double kStandOffMin_m = 0.6;
 constexpr double kStandOffMax_m = 1.5;
 constexpr double kAimCone_rad = 1.2;  // about the direction from unknown to free: 70 degrees, beyond it is grazing
@@ -168,22 +171,55 @@ void ViewChooser::note_progress(const ExploreOptions& options) {
 }
 
 bool ViewChooser::worthwhile(const Task& task, const Candidate& candidate) {
-  return candidate.free && (candidate.gain.unknown >= task.options.gain_min || candidate.gain.again >= task.again_min);
+  const ViewGain& gain = candidate.gain;
+  return candidate.free &&
+         (gain.unknown - gain.doubtful >= task.options.gain_min || gain.again - gain.doubtful_again >= task.again_min);
+}
+
+/// What a free candidate promises: its gain, and for one that is worth a view its utility.
+void ViewChooser::evaluate(const Task& task, Candidate& candidate, GainWorker& worker) const {
+  const ViewTiming& timing = task.options.timing;
+  candidate.gain = gain_.count(task.context, candidate.q, worker);
+  if (!worthwhile(task, candidate)) return;
+  const double move_s =
+      time_segment(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits).duration_s;
+  candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
 }
 
 void ViewChooser::score(const Task& task, RunParallel run_parallel) {
-  const ViewTiming& timing = task.options.timing;
   const auto score_one = [&](int index, int worker) {
     Candidate& candidate = candidates_[static_cast<std::size_t>(index)];
     find_candidate(task, index, candidate);
-    if (!candidate.free) return;
-    candidate.gain = gain_.count(task.context, candidate.q, workers_[static_cast<std::size_t>(worker)]);
-    if (!worthwhile(task, candidate)) return;
-    const double move_s =
-        time_segment(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits).duration_s;
-    candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
+    if (candidate.free) evaluate(task, candidate, workers_[static_cast<std::size_t>(worker)]);
   };
   run_parallel(task.candidates(), score_one);
+}
+
+/// Improves the best candidates by steps to the side and back towards where the arm is: what they see from there costs
+/// less of a move, or more is seen. Each keeps the best that its steps found.
+void ViewChooser::refine(const Task& task, RunParallel run_parallel) {
+  const ViewContext& c = task.context;
+  const auto refine_one = [&](int index, int worker) {
+    Candidate& best = candidates_[static_cast<std::size_t>(order_[static_cast<std::size_t>(index)])];
+    Random random(task.options.seed, kRefineStream + (static_cast<std::uint64_t>(task.options.step) << 10) +
+                                         static_cast<std::uint64_t>(index));
+    for (int step = 0; step < task.options.refine_steps; ++step) {
+      Candidate tried;
+      tried.tries = best.tries + 1;
+      const double back = std::max(0.0, random.uniform(-kBackMax, kBackMax));
+      tried.q = best.q;
+      for (int j = 0; j < c.arm.joints; ++j) {
+        const auto i = static_cast<std::size_t>(j);
+        const double q_rad = best.q[j] + back * (task.current[j] - best.q[j]) + kAside_rad * random.normal();
+        tried.q[j] = std::clamp(q_rad, c.arm.lower_rad[i] + kLimitMargin_rad, c.arm.upper_rad[i] - kLimitMargin_rad);
+      }
+      tried.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, tried.q, kTargetMargin_m);
+      if (tried.free) evaluate(task, tried, workers_[static_cast<std::size_t>(worker)]);
+      best.tries = tried.tries;
+      if (tried.utility_per_s > best.utility_per_s) best = tried;
+    }
+  };
+  run_parallel(std::min(task.options.refined, static_cast<int>(order_.size())), refine_one);
 }
 
 void ViewChooser::rank(const Task& task) {
@@ -259,7 +295,7 @@ void ViewChooser::certify_end(const Task& task, ViewChoice& choice) const {
        : i % kSources == 1 ? certificate.nearby_samples
                            : certificate.aimed_samples);
     if (!worthwhile(task, candidate)) {
-      certificate.gain_best = std::max(certificate.gain_best, candidate.gain.unknown);
+      certificate.gain_best = std::max(certificate.gain_best, candidate.gain.unknown - candidate.gain.doubtful);
     }
   }
   certificate.clusters =
@@ -284,11 +320,13 @@ Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVe
     task.certificate = certificate;
     task.samples = certificate ? options.certificate_samples : candidates_max_;
     score(task, run_parallel);
+    rank(task);
+    refine(task, run_parallel);
+    rank(task);
     for (int i = 0; i < task.candidates(); ++i) {
       choice.considered += candidates_[static_cast<std::size_t>(i)].tries;
       choice.free += candidates_[static_cast<std::size_t>(i)].free ? 1 : 0;
     }
-    rank(task);
     choice.worthwhile += static_cast<int>(order_.size());
     if (Status planned = plan_best(task, choice); !planned) return std::unexpected(planned.error());
     if (choice.outcome == ViewChoice::Outcome::kChosen) {

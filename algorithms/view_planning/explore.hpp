@@ -17,6 +17,8 @@ struct ExploreOptions {
   std::uint32_t gain_min = 8;               ///< unknown voxels that make a view worth it (k of the certificate)
   std::uint32_t again_min = 100;            ///< or voxels that it makes usable for motion
   std::uint32_t again_few = 30;             ///< the same while such views still open the way to something unknown
+  int refined = 16;                         ///< of the best candidates, each improved in small steps
+  int refine_steps = 16;                    ///< tried for one of them
   int plans_max = 24;                       ///< candidates that the planner may try; twice as many for the certificate
   int plan_iterations_max = 400;            ///< for one of them
   std::span<const JointVector> trail = {};  ///< PlannerOptions::trail
@@ -24,7 +26,8 @@ struct ExploreOptions {
   ViewTiming timing;
 };
 
-/// Why exploration ends: every sampled view that can be reached sees fewer than `gain_min` unknown voxels.
+/// Why exploration ends: every sampled view that can be reached sees fewer than `gain_min` unknown voxels along rays
+/// that are not known to go where nothing returns.
 struct TerminationCertificate {
   int random_samples = 0;  ///< free configurations drawn at random
   int nearby_samples = 0;  ///< drawn around where the arm is and has been
@@ -104,7 +107,9 @@ class ViewChooser {
   [[nodiscard]] JointVector draw_nearby(const Task& task, Random& random) const;
   [[nodiscard]] bool draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const;
   void find_candidate(const Task& task, int index, Candidate& out) const;
+  void evaluate(const Task& task, Candidate& candidate, GainWorker& worker) const;
   void score(const Task& task, RunParallel run_parallel);
+  void refine(const Task& task, RunParallel run_parallel);
   void note_progress(const ExploreOptions& options);
   [[nodiscard]] static bool worthwhile(const Task& task, const Candidate& candidate);
   void rank(const Task& task);

@@ -10,6 +10,7 @@ namespace firstlook {
 namespace {
 
 constexpr double kCell_m = 0.25;
+constexpr double kOpenShare = 0.75;
 constexpr int kColumnsMax = 80;  // of the pixels that are looked at: neighbours lie within a cell up to 20 m
 
 }  // namespace
@@ -98,12 +99,15 @@ bool FarReturns::is_open(const Eigen::Vector3d& from_m, const Eigen::Vector3d& t
   const Eigen::Vector3d way = to_m - from_m;
   const double leaves = leaves_map(from_m, way);
   if (leaves >= 1) return false;
-  bool open = true;
+  int crossed = 0, seen_open = 0;
+  bool returned = false;
   walk_ray(cells_, from_m + leaves * way, to_m, [&](std::size_t cell, double) {
-    open = seen_[cell] == kOpen;
-    return open;
+    returned = (seen_[cell] & kReturned) != 0;
+    ++crossed;
+    seen_open += seen_[cell] == kOpen ? 1 : 0;
+    return !returned;
   });
-  return open;
+  return !returned && seen_open > kOpenShare * crossed;
 }
 
 }  // namespace firstlook

@@ -24,7 +24,8 @@ class FarReturns {
              std::span<const float> self_depth_m);
   /// Whether a cell outside of the map where something returned lies on the line between two points.
   [[nodiscard]] bool lies_between(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) const;
-  /// Whether a line leaves the map and then, up to its end, crosses nothing but cells that were seen to be open.
+  /// Whether a line leaves the map and then, up to its end, crosses no cell where something returned, and mostly (three
+  /// quarters) such that were seen to be open: no two looks cross the same cells.
   [[nodiscard]] bool is_open(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) const;
   [[nodiscard]] bool knows_returns() const { return knows_returns_; }
   [[nodiscard]] bool knows_openings() const { return knows_openings_; }

@@ -86,8 +86,12 @@ void GainModel::prepare(const ViewContext& context) {
         if (counts && needs_backing(i)) backed_only_m_.extend(geometry_.center_m(geometry_.voxel_at(i)));
         break;
       case VoxelClass::kFree:
-        plane[i] =
-            counts && futile_.count(i) < sampling_.again_futile_max && needs_again(context, i) ? kAgainWeight : kPass;
+        if (context.map.holds_surface(i)) {
+          plane[i] = kOpaque;
+        } else {
+          const bool again = counts && futile_.count(i) < sampling_.again_futile_max && needs_again(context, i);
+          plane[i] = again ? kAgainWeight : kPass;
+        }
         break;
     }
   }

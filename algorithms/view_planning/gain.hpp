@@ -73,9 +73,10 @@ class GainModel {
 
   /// Reads map, zone, free space and prior map (after allow_prior() only). Unknown voxels of the zone in clusters that
   /// are large enough count; free ones
-  /// that motion cannot use yet count as `again`; voxels with futile_max futile looks stop rays like occupied ones.
-  /// Rays that have a known surface behind them count such a voxel still, until as many of their kind were futile, too:
-  /// a look into the open sky tells nothing, one past the same place towards a wall does.
+  /// that motion cannot use yet count as `again`; a free voxel that holds a surface stops rays: a part of it was hit,
+  /// and what lies behind that part is the inside of things; voxels with futile_max futile looks stop rays like
+  /// occupied ones. Rays that have a known surface behind them count such a voxel still, until as many of their kind
+  /// were futile, too: a look into the open sky tells nothing, one past the same place towards a wall does.
   void prepare(const ViewContext& context);
 
   /// What a look at configuration q would tell on the prepared map. Rays end at the trusted range; nearer than the
@@ -101,6 +102,10 @@ class GainModel {
   /// Whether a ray along a unit direction meets a known surface within the sensor's range, in the map or beyond it.
   [[nodiscard]] bool is_backed(const VoxelMap& map, const Eigen::Vector3d& from_m,
                                const Eigen::Vector3d& direction) const;
+  /// Whether a ray along a unit direction goes, by what has been seen, where nothing returns.
+  [[nodiscard]] bool is_open(const Eigen::Vector3d& from_m, const Eigen::Vector3d& direction) const {
+    return far_.is_open(from_m, from_m + sensor_.range_max_m * direction);
+  }
   /// Unknown voxels of the zone; from prepare().
   [[nodiscard]] std::size_t unknown() const { return unknown_; }
 

@@ -19,6 +19,7 @@ constexpr int kAimedTries = 16;              // directions from which each voxel
 /// Space and configurations as they could be at best: everything free that is not occupied, blocked or kept out.
 struct Optimist {
   const ViewContext& context;
+  const GainModel& gain;
   DistanceField field;
   FreeSpace space;
   double tan_x = 0;  ///< half the field of view
@@ -27,8 +28,8 @@ struct Optimist {
   double range_max_m = 0;
   std::vector<Transform<Base, Depth>> views;  ///< random configurations that fit there
 
-  Optimist(const ViewContext& c, const GainModel& gain)
-      : context(c), field(c.map.geometry(), kFieldDistanceMax_m), space(c.space) {
+  Optimist(const ViewContext& c, const GainModel& g)
+      : context(c), gain(g), field(c.map.geometry(), kFieldDistanceMax_m), space(c.space) {
     std::vector<std::uint8_t> not_occupied(c.map.size());
     for (std::size_t i = 0; i < not_occupied.size(); ++i) {
       not_occupied[i] = c.map.voxel_class(i) != VoxelClass::kOccupied && !c.map.blocked(i) ? 1 : 0;
@@ -47,7 +48,7 @@ struct Optimist {
 };
 
 /// What a look at a point meets.
-enum class Sight : std::uint8_t { kNone, kBadRange, kGood };
+enum class Sight : std::uint8_t { kNone, kNoReturn, kBadRange, kGood };
 
 /// Whether nothing occupied stands between a place and a voxel; unknown voxels are taken to be transparent.
 bool in_sight(const VoxelMap& map, const Eigen::Vector3d& eye, const Eigen::Vector3d& point, std::size_t voxel) {
@@ -64,7 +65,9 @@ Sight sight(const Optimist& o, const Transform<Base, Depth>& base_T_depth, const
   const Eigen::Vector3d p = base_T_depth.inverse() * point;
   if (p.z() <= 0 || std::abs(p.x()) > o.tan_x * p.z() || std::abs(p.y()) > o.tan_y * p.z()) return Sight::kNone;
   if (!in_sight(o.context.map, base_T_depth.translation(), point, voxel)) return Sight::kNone;
-  return p.z() >= o.range_min_m && p.norm() <= o.range_max_m ? Sight::kGood : Sight::kBadRange;
+  if (p.z() < o.range_min_m || p.norm() > o.range_max_m) return Sight::kBadRange;
+  const Eigen::Vector3d eye = base_T_depth.translation();
+  return o.gain.is_open(eye, (point - eye).normalized()) ? Sight::kNoReturn : Sight::kGood;
 }
 
 void sample_views(Optimist& o, const ReasonOptions& options, Random& random) {
@@ -98,7 +101,8 @@ Sight aimed_sight(const Optimist& o, const Eigen::Vector3d& point, std::size_t v
   return best;
 }
 
-RemainingReason reason_of(const Optimist& o, const GainModel& gain, std::uint32_t voxel, Random& random) {
+RemainingReason reason_of(const Optimist& o, std::uint32_t voxel, Random& random) {
+  const GainModel& gain = o.gain;
   if (gain.futile().count(voxel) >= gain.sampling().futile_max) return RemainingReason::kNoReturn;
   const GridGeometry& geometry = o.context.map.geometry();
   const Eigen::Vector3d point = geometry.center_m(geometry.voxel_at(voxel));
@@ -113,6 +117,8 @@ RemainingReason reason_of(const Optimist& o, const GainModel& gain, std::uint32_
       return RemainingReason::kOutOfReach;
     case Sight::kBadRange:
       return RemainingReason::kOutOfRange;
+    case Sight::kNoReturn:
+      return RemainingReason::kNoReturn;
     case Sight::kNone:
       break;
   }
@@ -147,7 +153,7 @@ std::vector<RemainingEntry> explain_remaining(const ViewContext& context, const 
     const std::size_t n = std::min(cluster.frontier.size(), static_cast<std::size_t>(options.voxels_per_cluster));
     for (std::size_t i = 0; i < n; ++i) {
       const std::uint32_t voxel = cluster.frontier[i * cluster.frontier.size() / n];
-      ++votes[static_cast<std::size_t>(reason_of(optimist, gain, voxel, random))];
+      ++votes[static_cast<std::size_t>(reason_of(optimist, voxel, random))];
     }
     const auto winner = std::max_element(votes.begin(), votes.end()) - votes.begin();
     entries.push_back({.voxels = cluster.voxels,

@@ -13,7 +13,7 @@ enum class RemainingReason : std::uint8_t {
   kOccluded,    ///< something occupied stands between it and every place that the camera could take
   kOutOfRange,  ///< in view, but nearer than the minimum or farther than the trusted range
   kOutOfReach,  ///< the arm could look at it, but only from space that is not known to be free
-  kNoReturn,    ///< looked at several times without an answer
+  kNoReturn,    ///< looked at without an answer, or in view only along rays that go where nothing returns
 };
 /// "occluded", "out_of_range", "out_of_reach", "no_return": the words of result.json.
 [[nodiscard]] std::string_view to_string(RemainingReason reason);
@@ -33,7 +33,8 @@ struct ReasonOptions {
 
 /// One entry for each cluster, in their order. Each tested frontier voxel votes: no_return when its looks were futile;
 /// else by whether any sampled configuration, ignoring what is known to be free, has it in view at a good range
-/// (out_of_reach), in view at a bad range only (out_of_range), or not at all (occluded). The most votes win.
+/// (out_of_reach), in view at a bad range only (out_of_range), against the open only (no_return), or not at all
+/// (occluded). The most votes win.
 [[nodiscard]] std::vector<RemainingEntry> explain_remaining(const ViewContext& context, const GainModel& gain,
                                                             std::span<const UnknownCluster> clusters,
                                                             const ReasonOptions& options = {});

@@ -11,8 +11,8 @@ namespace firstlook {
 
 inline constexpr std::string_view kCheckpointName = "checkpoint.yaml";
 
-/// Writes folder/checkpoint.yaml, whole or not at all and on the disk when it returns: a first line with the checksum of
-/// what follows, then the text of hand_eye.yaml. Error: kDiskWrite.
+/// Writes folder/checkpoint.yaml, whole or not at all and on the disk when it returns: a first line with the checksum
+/// of what follows, then the text of hand_eye.yaml. Error: kDiskWrite.
 [[nodiscard]] Status write_checkpoint(const std::string& folder, const StoredCalibration& calibration);
 
 /// Reads one. Errors: kDataMissing; kDataMalformed when the checksum is another; those of read_hand_eye.

@@ -108,11 +108,11 @@ Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& 
       devices_(devices),
       narrator_(narrator),
       workers_(std::make_unique<WorkerPool>(config.workers)),
+      status_(config.cell),
       color_source_(devices.color),
       depth_source_(devices.depth),
       pendant_source_(devices.pendant, OperatorDevice::kPendant),
       panel_source_(devices.panel, OperatorDevice::kPanel),
-      status_(config.cell),
       decisions_(*this, this),
       started_(utc_date_text()),
       wall_start_s_(static_cast<double>(monotonic_ns()) * 1e-9) {}

@@ -43,8 +43,7 @@ ServiceStatus::ServiceStatus(std::string_view works_on)
   // A quarter of the interval: a turn that is late by half of it is no hang.
   if (const std::int64_t us = watchdog_us(); us > 0 && manager_.present())
     watchdog_.emplace(manager_, Duration{us * 1000 / 4});
-  std::replace_if(
-      works_on_.begin(), works_on_.end(), [](char c) { return c == '"' || c == '\\'; }, ' ');
+  std::replace_if(works_on_.begin(), works_on_.end(), [](char c) { return c == '"' || c == '\\'; }, ' ');
 }
 
 void ServiceStatus::state(std::string_view name, bool ready) {

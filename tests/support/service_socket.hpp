@@ -15,8 +15,7 @@ namespace firstlook::test {
 
 class ServiceSocket {
  public:
-  ServiceSocket()
-      : path_(std::filesystem::temp_directory_path() / ("firstlook_notify_" + std::to_string(getpid()))) {
+  ServiceSocket() : path_(std::filesystem::temp_directory_path() / ("firstlook_notify_" + std::to_string(getpid()))) {
     descriptor_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;

@@ -10,7 +10,7 @@ void enter_ready(Machine& m) {
   m.light(hal::Light::kGreen);
   if (m.finished()) return;
   const bool stored = m.settings().scope == RunScope::kMap || m.settings().scope == RunScope::kVerify;
-  m.show(stored ? "ready: Play tests the stored calibration" : "ready: press Play on the pendant");
+  m.show("ready: {}", stored ? "Play tests the stored calibration" : "press Play on the pendant");
 }
 
 Handled on_ready(Machine& m, const MachineEvent& event) {

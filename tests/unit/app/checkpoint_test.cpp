@@ -16,7 +16,8 @@ StoredCalibration sample(double x_m) {
   c.accepted = true;
   c.arm_model = "ur5";
   c.kinematics = kinematics_checksum(*find_arm_model("ur5"));
-  c.flange_T_camera = Transform<Flange, Camera>(Eigen::Quaterniond(0.99, 0.1, -0.02, 0.03).normalized(), {x_m, 0, 0.06});
+  c.flange_T_camera =
+      Transform<Flange, Camera>(Eigen::Quaterniond(0.99, 0.1, -0.02, 0.03).normalized(), {x_m, 0, 0.06});
   c.covariance = 1e-8 * Matrix6d::Identity();
   c.corner_sigma_px = 0.025;
   c.arm_sigma = {1.1e-4, 1.9e-4};

@@ -117,6 +117,32 @@ TEST_CASE("one seed gives one choice, with one worker and with two", "[explore]"
   REQUIRE_FALSE(c->target == a->target);
 }
 
+TEST_CASE("small steps from the best candidates find better views", "[explore]") {
+  SmallWorld world(room_with_wall());
+  ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1);
+  world.look(world.q);
+  JointVector beside = world.q;
+  beside[0] += 0.2;
+  world.look(beside);
+  world.update();
+  double with = 0, without = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    ExploreOptions options;
+    options.seed = seed;
+    options.refined = 0;
+    const auto plain = chooser.choose(world.context(), world.q, options, run_serially);
+    options.refined = 16;
+    const auto refined = chooser.choose(world.context(), world.q, options, run_serially);
+    REQUIRE(plain);
+    REQUIRE(refined);
+    REQUIRE(refined->outcome == ViewChoice::Outcome::kChosen);
+    CHECK(world.entries_into_unknown(refined->path) == 0);
+    with += refined->utility_per_s;
+    without += plain->utility_per_s;
+  }
+  CHECK(with > 1.1 * without);
+}
+
 TEST_CASE("an arm with no room to move says that nothing can be reached", "[explore]") {
   SmallWorld world(Truth::room());
   ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1, 300);

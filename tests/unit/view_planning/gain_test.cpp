@@ -118,7 +118,7 @@ TEST_CASE("what only rays into the open would tell is doubtful, and weighs littl
   model.learn_returns({{nothing.data(), world.sensor.intrinsics.width, world.sensor.intrinsics.height}, 1000},
                       forward(world.arm, world.q).flange() * world.mount, {});
   const ViewGain after = model.count(world.context(), world.q, worker);
-  CHECK(after.unknown == before.unknown);  // the certificate that ends exploration still asks for it
+  CHECK(after.unknown == before.unknown);  // it is still there; what ends exploration asks for the rest
   CHECK(after.doubtful > 0.8 * after.unknown);
   CHECK(after.weight() < 0.3 * before.weight());
 }
@@ -143,6 +143,39 @@ TEST_CASE("specks of unknown voxels count nothing, clusters do", "[gain]") {
     if (edge == 2) CHECK(unknown >= 4);
     CHECK(model.unknown() == static_cast<std::size_t>(edge * edge * edge));
   }
+}
+
+TEST_CASE("a voxel that a surface half fills hides what is behind it", "[gain]") {
+  SmallWorld world(Truth::room());
+  const GridGeometry& g = world.map.geometry();
+  for (std::size_t i = 0; i < world.map.size(); ++i) world.map.set(i, VoxelClass::kFree, 0);
+  const Transform<Base, Depth> eye = forward(world.arm, world.q).flange() * world.mount;
+  // Three unknown voxels deep behind a layer of free ones, all across the optical axis.
+  const Eigen::Vector3i at = g.voxel(eye * Eigen::Vector3d(0, 0, 0.9));
+  std::vector<std::size_t> layer;
+  for (int a = -2; a <= 2; ++a) {
+    for (int b = -2; b <= 2; ++b) {
+      for (int deep = 0; deep < 3; ++deep)
+        world.map.set(g.index(at + Eigen::Vector3i(deep, a, b)), VoxelClass::kUnknown, 0);
+    }
+  }
+  const Eigen::Vector3i box_low = at + Eigen::Vector3i(-1, -3, -3), box_high = at + Eigen::Vector3i(3, 3, 3);
+  for (int x = box_low.x(); x <= box_high.x(); ++x) {
+    for (int y = box_low.y(); y <= box_high.y(); ++y) {
+      for (int z = box_low.z(); z <= box_high.z(); ++z) {
+        const Eigen::Vector3i v(x, y, z);
+        const bool shell = (v.array() == box_low.array() || v.array() == box_high.array()).any();
+        if (shell) layer.push_back(g.index(v));
+      }
+    }
+  }
+  GainModel model(g, world.sensor);
+  GainWorker worker = model.worker();
+  model.prepare(world.context());
+  REQUIRE(model.count(world.context(), world.q, worker).unknown > 50);
+  for (const std::size_t i : layer) world.map.note_surface(i, 0);
+  model.prepare(world.context());
+  CHECK(model.count(world.context(), world.q, worker).unknown == 0);
 }
 
 TEST_CASE("the frontier is unknown and touches free space", "[gain]") {

@@ -75,7 +75,7 @@ TEST_CASE("on a terminal the progress line is rewritten and gives way to lines t
 TEST_CASE("lines for the system's journal have their priority, and only when it is the journal that reads") {
   int ends[2];
   REQUIRE(pipe(ends) == 0);
-  struct stat file {};
+  struct stat file{};
   REQUIRE(fstat(ends[1], &file) == 0);
   const auto stream = [&](unsigned long long inode) {
     return std::to_string(file.st_dev) + ":" + std::to_string(inode);
