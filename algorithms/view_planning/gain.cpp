@@ -206,7 +206,7 @@ GainModel::Passed GainModel::pass_with_backing(const ViewContext& context, const
   if (!Eigen::AlignedBox3d(eye.cwiseMin(end), eye.cwiseMax(end)).intersects(backed_only_m_)) return passed;
   walk_ray(geometry_, eye, end, [&](std::size_t i, double entry) {
     const VoxelClass voxel = context.map.voxel_class(i);
-    if (voxel == VoxelClass::kOccupied) return false;
+    if (voxel == VoxelClass::kOccupied || context.map.holds_surface(i)) return false;
     if (voxel == VoxelClass::kFree || entry * depth_m < sensor_.range_min_m) return true;
     if (futile_.backed(i) >= sampling_.futile_max) return false;
     if (context.zone[i] != 0 && needs_backing(i) && !passed.full()) passed.push_back(static_cast<std::uint32_t>(i));
