@@ -1,4 +1,7 @@
 # The Debian package: `make deb`. What it installs, and what it depends on, is all here.
+if(CMAKE_INSTALL_PREFIX_INITIALIZED_TO_DEFAULT)
+  set(CMAKE_INSTALL_PREFIX /usr CACHE PATH "where the package puts things" FORCE)
+endif()
 include(GNUInstallDirs)
 set(packaging ${CMAKE_SOURCE_DIR}/toolchain/packaging)
 set(documentation ${CMAKE_INSTALL_DOCDIR})
@@ -10,6 +13,7 @@ install(FILES ${packaging}/60-firstlook.rules DESTINATION /lib/udev/rules.d)
 install(FILES ${packaging}/80-firstlook-can.network DESTINATION /lib/systemd/network)
 install(FILES ${packaging}/firstlook.sysusers DESTINATION /usr/lib/sysusers.d RENAME firstlook.conf)
 install(FILES ${packaging}/copyright ${packaging}/README.Debian ${packaging}/COMMISSIONING.md DESTINATION ${documentation})
+install(FILES ${packaging}/lintian-overrides DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides RENAME firstlook)
 install(FILES ${packaging}/firstlook.yaml DESTINATION ${documentation}/examples)
 
 # Debian wants its texts compressed without a time stamp, so that the same sources give the same package.
@@ -34,10 +38,11 @@ set(CPACK_PACKAGE_NAME firstlook)
 set(CPACK_PACKAGE_CONTACT "firstlook developers <firstlook@example.com>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "calibrates the camera on a robot arm and maps its work cell")
 set(CPACK_PACKAGE_DESCRIPTION
-    "Press one button, and firstlook finds the calibration board, works out where the
-camera sits on the arm and how sure that is, looks around without moving through
-space that it has not seen to be free, and leaves a calibrated camera and a
-collision map for any motion planner. It runs with no hardware in a simulated cell.")
+    "Press one button, and firstlook finds the calibration board, works out
+where the camera sits on the arm and how sure that is, looks around without
+moving through space that it has not seen to be free, and leaves a calibrated
+camera and a collision map for any motion planner. It runs with no hardware
+in a simulated cell.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_SET_DESTDIR ON)
 set(CPACK_STRIP_FILES ON)
