@@ -1,37 +1,41 @@
 #include "hal/ur/control_protocol.hpp"
 
+#include <array>
 #include <cmath>
 
 namespace firstlook::ur {
 namespace {
 
-void put(Command& command, std::int32_t value) { command.number(static_cast<std::uint32_t>(value), 4); }
+/// The numbers of a command but for the sum.
+using Numbers = std::array<std::int32_t, kCommandNumbers - 1>;
 
-/// UrArm has looked that it fits.
-void put_micro(Command& command, double value) { put(command, static_cast<std::int32_t>(std::lround(value * 1e6))); }
-
-Command begin(CommandKind kind, std::int32_t number) {
+Command with_sum(const Numbers& numbers) {
   Command command;
-  put(command, kCommandMark);
-  put(command, static_cast<std::int32_t>(kind));
-  put(command, number);
+  std::int32_t sum = 0;
+  for (const std::int32_t number : numbers) {
+    command.number(static_cast<std::uint32_t>(number), 4);
+    sum += number;
+  }
+  command.number(static_cast<std::uint32_t>(sum), 4);
   return command;
 }
+
+/// UrRobot has looked that it fits.
+std::int32_t micro(double value) { return static_cast<std::int32_t>(std::lround(value * 1e6)); }
 
 }  // namespace
 
 Command plain_command(CommandKind kind, std::int32_t number) {
-  Command command = begin(kind, number);
-  for (std::size_t i = 3; i < kCommandNumbers; ++i) put(command, 0);
-  return command;
+  return with_sum({kCommandMark, static_cast<std::int32_t>(kind), number});
 }
 
 Command move_command(const hal::Segment& segment) {
-  Command command = begin(CommandKind::kMove, static_cast<std::int32_t>(segment.number));
-  for (int j = 0; j < 6; ++j) put_micro(command, segment.target_rad[j]);
-  put_micro(command, segment.speed_rad_s);
-  put_micro(command, segment.acceleration_rad_s2);
-  return command;
+  Numbers numbers{kCommandMark, static_cast<std::int32_t>(CommandKind::kMove),
+                  static_cast<std::int32_t>(segment.number)};
+  for (int j = 0; j < 6; ++j) numbers[3 + static_cast<std::size_t>(j)] = micro(segment.target_rad[j]);
+  numbers[9] = micro(segment.speed_rad_s);
+  numbers[10] = micro(segment.acceleration_rad_s2);
+  return with_sum(numbers);
 }
 
 std::optional<ProgramReport> cut_report(std::string_view received) {

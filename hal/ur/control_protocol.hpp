@@ -16,7 +16,8 @@ inline constexpr std::int32_t kControlProtocol = 1;
 /// Begins every command: a program that finds something else has lost its place in the stream, and ends.
 inline constexpr std::int32_t kCommandMark = 5310;
 
-/// To the robot: kCommandMark, kind, number, six joint angles (µrad), speed and acceleration (µrad/s, µrad/s²).
+/// To the robot: kCommandMark, kind, number, six joint angles (µrad), speed and acceleration (µrad/s, µrad/s²), and the
+/// sum of all these, which tells a command that was cut or mixed up.
 enum class CommandKind : std::int32_t {
   kStay = 0,    ///< nothing new; that it comes says that firstlook is there
   kMove = 1,    ///< movej to the joints; the number is the segment's
@@ -24,7 +25,8 @@ enum class CommandKind : std::int32_t {
   kEnd = 3,     ///< end the program
   kRefuse = 4,  ///< the same, and tell the person at the pendant that the versions do not fit
 };
-inline constexpr std::size_t kCommandNumbers = 11;
+inline constexpr std::size_t kCommandNumbers = 12;
+inline constexpr std::int32_t kNumberMax = 1'000'000'000;  ///< of a segment or stop: sums fit 32 bits
 using Command = Message<4 * kCommandNumbers>;
 [[nodiscard]] Command plain_command(CommandKind kind, std::int32_t number);
 [[nodiscard]] Command move_command(const hal::Segment& segment);

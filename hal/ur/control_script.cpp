@@ -19,6 +19,17 @@ global fl_segment = 0
 global fl_done = 0
 global fl_texts = False
 
+# A command is whole and in its place: it begins with its mark, and its sum is right.
+def fl_whole(c):
+  local i = 1
+  local sum = 0
+  while i < %NUMBERS%:
+    sum = sum + c[i]
+    i = i + 1
+  end
+  return c[1] == %MARK% and sum == c[%NUMBERS%]
+end
+
 def fl_say(kind, number):
   socket_send_int(kind, "firstlook")
   socket_send_int(number, "firstlook")
@@ -72,7 +83,7 @@ else:
     if fl_c[0] != %NUMBERS%:
       textmsg("firstlook: nothing heard from it: the arm stops")
       fl_going = False
-    elif fl_c[1] != %MARK%:
+    elif not fl_whole(fl_c):
       textmsg("firstlook: a command that is none: the arm stops")
       fl_going = False
     elif fl_c[2] == %MOVE%:

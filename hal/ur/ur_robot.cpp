@@ -47,8 +47,8 @@ Status check(const hal::Segment& segment) {
     return failure(Fault::kMoveRefused, "segment {}: speed {} rad/s or acceleration {} rad/s2 out of range",
                    segment.number, segment.speed_rad_s, segment.acceleration_rad_s2);
   }
-  if (segment.number == 0 || segment.number > INT32_MAX) {
-    return failure(Fault::kMoveRefused, "segment {}: numbers count up from 1", segment.number);
+  if (segment.number == 0 || segment.number > static_cast<std::uint32_t>(kNumberMax)) {
+    return failure(Fault::kMoveRefused, "segment {}: numbers count up from 1, to 1e9", segment.number);
   }
   return {};
 }

@@ -44,6 +44,11 @@ class UrRobot final : public hal::RobotArm {
 
   /// @param notices  may be null; it and the network outlive the robot
   UrRobot(Network& network, const UrRobotOptions& options, NoticeSink* notices = nullptr);
+  UrRobot(const UrRobot&) = delete;
+  UrRobot& operator=(const UrRobot&) = delete;
+
+  /// Ends the program on the robot.
+  ~UrRobot() override { program_.send(plain_command(CommandKind::kEnd, 0)); }
 
   [[nodiscard]] const char* model() const override { return model_.data(); }
   [[nodiscard]] std::optional<hal::ArmState> poll(Instant now) override;

@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hal/sim/ur_controller/simulated_ur.hpp"
@@ -26,10 +27,24 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
     while (time_ + robot_.cycle() <= now) {
       robot_.step();
       time_ = time_ + robot_.cycle();
+      if (time_ < stalled_until_) continue;
+      for (Pipe& pipe : pipes_) {
+        pipe.to_script += pipe.held;
+        pipe.held.clear();
+      }
     }
   }
   /// The cable: nothing gets through while it is out, and nothing that was sent then comes later.
   void plug(bool in) { plugged_ = in; }
+  /// For so long everything is delayed, then it comes at once.
+  void stall(double s) { stalled_until_ = time_ + seconds(s); }
+  /// What we send next on a connection with the program arrives so: without some of its bytes, twice, or changed.
+  enum class Damage : std::uint8_t { kNone, kCut, kTwice, kChanged };
+  void damage_next(Damage damage) { damage_ = damage; }
+  /// The connections with the program carry nothing any more, and neither side is told.
+  void half_open() {
+    for (Pipe& pipe : pipes_) pipe.dead = true;
+  }
   /// Ends the connection of the program for commands, on our side only: the program finds it closed.
   void break_control() {
     for (Pipe& pipe : pipes_) {
@@ -84,8 +99,8 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
     std::string* bytes = slot.kind == Slot::Kind::kPipe ? &pipes_[slot.pipe].to_us
                          : slot.session != nullptr      ? &slot.session->output()
                                                         : nullptr;
-    if (bytes == nullptr) return {};
-    if (!plugged_) {
+    if (bytes == nullptr || time_ < stalled_until_) return {};
+    if (!plugged_ || (slot.kind == Slot::Kind::kPipe && pipes_[slot.pipe].dead)) {
       bytes->clear();
       return {};
     }
@@ -101,7 +116,8 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
     if (slot.kind == Slot::Kind::kSession) {
       slot.session->receive(bytes);
     } else {
-      pipes_[slot.pipe].to_script.append(bytes);
+      Pipe& pipe = pipes_[slot.pipe];
+      if (!pipe.dead) (time_ < stalled_until_ ? pipe.held : pipe.to_script).append(damaged(bytes));
     }
     return true;
   }
@@ -115,13 +131,14 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
   // Sockets of the controller's scripts.
   Id open(const std::string&, std::uint16_t port) override {
     if (!plugged_ || (port != kProgramPort && port != kControlPort)) return 0;
-    pipes_.push_back({port, {}, {}, false, false, false});
+    pipes_.push_back({});
+    pipes_.back().port = port;
     return pipes_.size();
   }
   State state(Id socket) const override { return script_state(socket); }
   bool send(Id socket, std::string_view bytes) override {
     if (script_state(socket) != State::kOpen) return false;
-    if (plugged_) pipes_[socket - 1].to_us.append(bytes);
+    if (plugged_ && !pipes_[socket - 1].dead) pipes_[socket - 1].to_us.append(bytes);
     return true;
   }
   std::string& received(Id socket) override { return pipes_[socket - 1].to_script; }
@@ -130,7 +147,8 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
  private:
   struct Pipe {
     std::uint16_t port = 0;
-    std::string to_script, to_us;
+    std::string to_script, held, to_us;
+    bool dead = false;
     bool accepted = false, closed_by_script = false, closed_by_us = false;
   };
   struct Slot {
@@ -138,6 +156,23 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
     sim::ur::Session* session = nullptr;
     std::size_t pipe = 0;
   };
+  std::string damaged(std::string_view bytes) {
+    std::string result(bytes);
+    switch (std::exchange(damage_, Damage::kNone)) {
+      case Damage::kNone:
+        break;
+      case Damage::kCut:
+        result.resize(result.size() / 2);
+        break;
+      case Damage::kTwice:
+        result += result;
+        break;
+      case Damage::kChanged:
+        result[result.size() / 2 + 2] = static_cast<char>(result[result.size() / 2 + 2] ^ 0x55);  // some 20 mrad
+        break;
+    }
+    return result;
+  }
   static std::size_t at(ur::LinkId link) { return static_cast<std::size_t>(link); }
   [[nodiscard]] State script_state(Id socket) const {
     const Pipe& pipe = pipes_[socket - 1];
@@ -154,6 +189,8 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
   sim::ur::SimulatedUr& robot_;
   Instant time_{};
   bool plugged_ = true;
+  Instant stalled_until_{};
+  Damage damage_ = Damage::kNone;
   std::array<Slot, ur::kLinksMax> slots_{};
   std::vector<Pipe> pipes_;
 };

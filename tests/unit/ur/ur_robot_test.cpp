@@ -218,6 +218,18 @@ TEST_CASE("an emergency stop and a safeguard stop end consent; a gate that close
   }
 }
 
+TEST_CASE("a command that is cut or changed on the way moves nothing and ends the program", "[ur]") {
+  using Damage = test::UrMemoryNetwork::Damage;
+  const Damage damage = GENERATE(Damage::kCut, Damage::kChanged);
+  Playing playing;
+  test::DrivenUr& arm = playing.arm;
+  arm.network.damage_next(damage);
+  playing.move(1, 1);
+  CHECK(playing.turned(2) < kStands_rad);
+  CHECK_FALSE(arm.ur.state().program_running());
+  CHECK_FALSE(arm.last.program_running);
+}
+
 TEST_CASE("the slider slows the arm and nothing else", "[ur]") {
   Playing playing;
   test::DrivenUr& arm = playing.arm;
