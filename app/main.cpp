@@ -320,6 +320,7 @@ RobotRecord robot_record(ur::NetworkRobot& on_network, const MeasuredArm& arm) {
   std::copy_n(arm.model.dh.begin(), record.dh.size(), record.dh.begin());
   if (arm.near) record.fit = {arm.near->rms_m, arm.near->rms_rad};
   record.consent_s = delays.consent_s;
+  record.motion_s = delays.motion_s;
   record.accept_s = delays.accept_s;
   record.stop_s = delays.stop_s;
   record.reports = on_network.robot().rtde().counters().reports;

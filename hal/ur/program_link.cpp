@@ -56,6 +56,7 @@ void ProgramLink::hear(Instant now, Visitor& visitor) {
   if (visitor.door == Door::kProgram) {
     if (visitor.inbox.view().starts_with(kRequest)) {
       network_.send(visitor.link, script_);
+      asked_ = now;
       return drop(visitor.link);  // its end says that this was all
     }
   } else if (visitor.inbox.view().size() >= ProgramReport::kBytes) {

@@ -38,6 +38,8 @@ class ProgramLink {
   [[nodiscard]] bool up() const { return commands_.link != kNoLink; }
   /// Programs that were connected so far.
   [[nodiscard]] std::uint64_t programs() const { return programs_; }
+  /// When the program was asked for last: somebody has pressed Play.
+  [[nodiscard]] const std::optional<Instant>& asked() const { return asked_; }
   /// What it reports, oldest first.
   [[nodiscard]] std::optional<ProgramReport> take();
   /// False: it is gone.
@@ -66,6 +68,7 @@ class ProgramLink {
   std::array<Visitor, 4> visitors_;
   Visitor commands_, texts_;  ///< links of the program that runs
   std::uint64_t programs_ = 0;
+  std::optional<Instant> asked_;
   std::array<char, kLineMax + 1> line_{};
   std::size_t line_size_ = 0;
 };

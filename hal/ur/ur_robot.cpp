@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hal/ur/control_script.hpp"
 
@@ -86,7 +87,11 @@ void UrRobot::hear_program(Instant now) {
   const std::uint64_t before = program_.programs();
   program_.poll(now);
   if (program_.programs() != before) {
-    up_since_ = now;
+    // A request without a program soon after was another one's.
+    constexpr Duration kSoon = milliseconds(5000);
+    const auto& asked = program_.asked();
+    played_ = asked && now - *asked < kSoon ? *asked : now;
+    moved_ = false;
     was_up_ = true;
     flight_ = Flight::kNone;
     withdrawn_ = false;
@@ -99,6 +104,7 @@ void UrRobot::hear_program(Instant now) {
         flight_ = Flight::kMoving;
         accepted_ = number_;
         delays_.accept_s = std::max(delays_.accept_s, (now - sent_).seconds());
+        if (!std::exchange(moved_, true)) delays_.motion_s = std::max(delays_.motion_s, (now - played_).seconds());
         break;
       case ReportKind::kDone:
         if (flight_ != Flight::kMoving || static_cast<std::uint32_t>(report->number) != number_) break;
@@ -188,7 +194,7 @@ void UrRobot::follow(const RtdeReport& report, Instant now) {
   const bool stands = report.velocity_rad_s.max_abs() < kStanding_rad_s;
   if (flight_ == Flight::kArriving && ++standing_reports_ >= kStandingReports && stands) flight_ = Flight::kNone;
   if (consent() && !consented_) {
-    delays_.consent_s = std::max(delays_.consent_s, (now - up_since_).seconds());
+    if (!moved_) delays_.consent_s = std::max(delays_.consent_s, (now - played_).seconds());
     press(hal::OperatorAction::kPlay, now);
   }
   consented_ = consent();

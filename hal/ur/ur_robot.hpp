@@ -24,7 +24,8 @@ struct UrRobotOptions {
 
 /// What took how long; the longest of each.
 struct UrDelays {
-  double consent_s = 0;  ///< from the program's connection until it could be moved
+  double consent_s = 0;  ///< from Play (the program was asked for, or connected) until the arm might be moved
+  double motion_s = 0;   ///< from there until the first segment had begun
   double accept_s = 0;   ///< from a segment's command until the program had begun it
   double stop_s = 0;     ///< from the command to stop until the program said that the arm stands
 };
@@ -111,7 +112,8 @@ class UrRobot final : public hal::RobotArm {
   std::optional<Instant> heard_;  ///< when it came
   std::optional<Instant> opens_;  ///< from when on programs are let in
   bool was_up_ = false;
-  Instant up_since_{};
+  Instant played_{};
+  bool moved_ = false;          ///< since then
   std::optional<Instant> cut_;  ///< since when the program plays without a connection to us
   bool consented_ = false;
 

@@ -50,6 +50,7 @@ TEST_CASE("Play, a segment, its end", "[ur]") {
   Playing playing(model.c_str());
   test::DrivenUr& arm = playing.arm;
   CHECK(arm.keys == std::vector{OperatorAction::kPlay});
+  CHECK(arm.robot.delays().consent_s > 0.002);  // the program is asked for, dials, says hello
   CHECK(arm.robot.delays().consent_s < 0.1);
   playing.move(1, 0.5);
   arm.run(0.3);
