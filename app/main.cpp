@@ -320,7 +320,6 @@ RobotRecord robot_record(ur::NetworkRobot& on_network, const MeasuredArm& arm) {
   std::copy_n(arm.model.dh.begin(), record.dh.size(), record.dh.begin());
   if (arm.near) record.fit = {arm.near->rms_m, arm.near->rms_rad};
   record.consent_s = delays.consent_s;
-  record.motion_s = delays.motion_s;
   record.accept_s = delays.accept_s;
   record.stop_s = delays.stop_s;
   record.reports = on_network.robot().rtde().counters().reports;
@@ -411,6 +410,11 @@ int run_job(const RunCommand& command) {
   record.wall.boot_heap_bytes = static_cast<std::uint64_t>(std::max<std::int64_t>(0, boot_heap_bytes));
   if (on_network) {
     record.robot = robot_record(*on_network, measured);
+    const ur::UrDelays& delays = on_network->robot().delays();
+    narrator.line(
+        fmt::format("robot     from Play to consent {:.3f} s, to the first motion {:.3f} s; a segment begins within "
+                    "{:.3f} s, a stop stands within {:.3f} s",
+                    delays.consent_s, delays.motion_s, delays.accept_s, delays.stop_s));
     record.provenance.kinematics = kinematics_checksum(*facts.arm);
   }
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";

@@ -31,10 +31,8 @@ std::string provenance_section(const RunRecord& record) {
     std::string sums;
     for (const std::uint32_t sum : robot.kinematics_checksums) sums += fmt::format("{:08x} ", sum);
     table.row({"its kinematics as measured in the factory, checksums", sums});
-    table.row(
-        {"longest from Play to consent, from Play to the first motion, from command to motion, from stop to standstill",
-         fmt::format("{:.3f}, {:.3f}, {:.3f}, {:.3f} s", robot.consent_s, robot.motion_s, robot.accept_s,
-                     robot.stop_s)});
+    table.row({"longest from its program's connection to consent, from command to motion, from stop to standstill",
+               fmt::format("{:.3f}, {:.3f}, {:.3f} s", robot.consent_s, robot.accept_s, robot.stop_s)});
   }
   table.row({"cell", record.cell});
   table.row({"seed", fmt::format("{}", record.seed)});

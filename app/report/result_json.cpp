@@ -92,7 +92,6 @@ Json robot_json(const RobotRecord& robot) {
             {"dh", rows},
             {"fit", robot.fit ? Json{{"rms_m", robot.fit->rms_m}, {"rms_rad", robot.fit->rms_rad}} : Json(nullptr)}}},
           {"play_to_consent_s", robot.consent_s},
-          {"play_to_motion_s", robot.motion_s},
           {"segment_begins_within_s", robot.accept_s},
           {"stop_stands_within_s", robot.stop_s},
           {"joint_reports", robot.reports},

@@ -276,8 +276,7 @@ struct RobotRecord {
     double rms_m = 0, rms_rad = 0;
   };
   std::optional<Fit> fit;
-  double consent_s = 0;       ///< the longest from Play until the arm might be moved
-  double motion_s = 0;        ///< and until the first segment had begun
+  double consent_s = 0;       ///< the longest from the program's connection until it could be moved
   double accept_s = 0;        ///< and from a segment's command until the program had begun it
   double stop_s = 0;          ///< and from a command to stop until the arm stood
   std::uint64_t reports = 0;  ///< of the joints

@@ -128,6 +128,8 @@ else:
   kill fl_show_thread
   socket_close("firstlook_text")
 end
+# A program that is set to loop forever would connect again by itself: only a person may begin.
+halt
 # NODE_CONTROL_LOOP_ENDS
 )script";
 

@@ -289,6 +289,20 @@ TEST_CASE("the plain script does the same without the URCap", "[ur]") {
   CHECK(arm.keys == std::vector{OperatorAction::kPlay});
 }
 
+TEST_CASE("a program that loops forever does not begin again by itself", "[ur]") {
+  test::DrivenUr arm("ur5");
+  arm.run(0.6);
+  sim::ur::Session& port = arm.ur.robot.open(sim::ur::Port::kSecondary);
+  port.receive("def cart():\nwhile True:\n" +
+               ur::control_script("firstlook", test::UrMemoryNetwork::kControlPort) + "\nend\nend\n");
+  arm.run(0.5);
+  REQUIRE(arm.last.program_running);
+  arm.network.break_control();
+  arm.run(3);
+  CHECK_FALSE(arm.ur.state().program_running());
+  CHECK(arm.robot.program().programs() == 1);
+}
+
 TEST_CASE("Play within the self test is answered after it", "[ur]") {
   test::DrivenUr arm("ur5");
   arm.run(0.05);
