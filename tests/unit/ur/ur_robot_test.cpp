@@ -293,8 +293,8 @@ TEST_CASE("a program that loops forever does not begin again by itself", "[ur]")
   test::DrivenUr arm("ur5");
   arm.run(0.6);
   sim::ur::Session& port = arm.ur.robot.open(sim::ur::Port::kSecondary);
-  port.receive("def cart():\nwhile True:\n" +
-               ur::control_script("firstlook", test::UrMemoryNetwork::kControlPort) + "\nend\nend\n");
+  port.receive("def cart():\nwhile True:\n" + ur::control_script("firstlook", test::UrMemoryNetwork::kControlPort) +
+               "\nend\nend\n");
   arm.run(0.5);
   REQUIRE(arm.last.program_running);
   arm.network.break_control();
