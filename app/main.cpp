@@ -10,6 +10,7 @@
 #include <string>
 #include <system_error>
 
+#include "algorithms/kinematics/near_dh.hpp"
 #include "app/cli/cli.hpp"
 #include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
@@ -20,9 +21,13 @@
 #include "app/shell/cart.hpp"
 #include "app/shell/job_settings.hpp"
 #include "app/shell/replay.hpp"
+#include "hal/sim/cell_file.hpp"
 #include "hal/sim/faults.hpp"
 #include "hal/sim/simulated_cell.hpp"
 #include "hal/sim/ur_controller/tcp_service.hpp"
+#include "hal/sim/ur_controller/truth_reader.hpp"
+#include "hal/ur/control_script.hpp"
+#include "hal/ur/network_robot.hpp"
 #include "platform/linux/files.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/terminal.hpp"
@@ -245,6 +250,86 @@ Result<std::optional<StoredCalibration>> stored_calibration(RunScope scope, cons
   return std::optional(*read);
 }
 
+/// What the robot's side has to say, among the lines of the job.
+class RobotNotices final : public ur::NoticeSink {
+ public:
+  explicit RobotNotices(Narrator& narrator) : narrator_(narrator) {}
+  void notice(std::string_view line) override {
+    std::array<char, 256> text;
+    const auto end = fmt::format_to_n(text.data(), text.size(), "robot     {}", line);
+    narrator_.line({text.data(), std::min(end.size, text.size())});
+  }
+
+ private:
+  Narrator& narrator_;
+};
+
+/// Where the true joints of a simulated robot are told, for the cell's cameras: at the address of the robot itself.
+Status follow_true_joints(const Config& config, sim::ur::TruthReader& truth) {
+  const int port = static_cast<int>(sim::ur::Port::kTruth) + config.robot.port_offset;
+  return truth.connect(config.robot.host, static_cast<std::uint16_t>(port));
+}
+
+Result<std::unique_ptr<ur::NetworkRobot>> connect_robot(const Config& config, ur::NoticeSink& notices) {
+  ur::NetworkRobotOptions options;
+  options.network = {config.robot.host, config.robot.port_offset, static_cast<std::uint16_t>(config.robot.program_port),
+                     static_cast<std::uint16_t>(config.robot.control_port)};
+  options.own_address = config.robot.own_address;
+  options.arm = config.arm.model;
+  options.payload_kg = config.robot.payload_kg;
+  return ur::NetworkRobot::connect(options, &notices);
+}
+
+/// The configured model with the kinematics that the robot's factory measured.
+struct MeasuredArm {
+  ArmModel model;
+  std::optional<NearDh> near;  ///< where the measured frames lie far from the links
+};
+
+/// Error: kConfigBadValue for kinematics that are not those of such an arm.
+Result<MeasuredArm> arm_of(const ur::RobotIdentity& robot, const Config& config) {
+  constexpr double kNear_m = 0.02, kNear_rad = 0.05;           // ten times what a factory corrects
+  constexpr double kFitWorst_m = 0.005, kFitWorst_rad = 0.01;  // another arm
+  MeasuredArm arm{find_arm_model(config.arm.model).value(), {}};
+  const std::array<DhRow, kJointsMax> published = arm.model.dh;
+  bool near = true;
+  for (std::size_t j = 0; j < robot.kinematics.rows.size(); ++j) {
+    const ur::KinematicsRow& row = robot.kinematics.rows[j];
+    arm.model.dh[j] = {row.theta_rad, row.d_m, row.a_m, row.alpha_rad};
+    near = near && std::abs(row.d_m - published[j].d_m) < kNear_m && std::abs(row.a_m - published[j].a_m) < kNear_m &&
+           std::abs(row.theta_rad - published[j].theta_offset_rad) < kNear_rad &&
+           std::abs(row.alpha_rad - published[j].alpha_rad) < kNear_rad;
+  }
+  if (near) return arm;
+  arm.near = near_dh(find_arm_model(config.arm.model).value(), arm.model.dh);
+  arm.model.dh = arm.near->dh;
+  if (arm.near->worst_m > kFitWorst_m || arm.near->worst_rad > kFitWorst_rad) {
+    return failure(
+        Fault::kConfigBadValue,
+        "robot at {}: its kinematics are not those of a {}: the flange would be off by {:.1f} mm, {:.1f} mrad",
+        config.robot.host, arm.model.name, 1e3 * arm.near->worst_m, 1e3 * arm.near->worst_rad);
+  }
+  return arm;
+}
+
+RobotRecord robot_record(ur::NetworkRobot& on_network, const MeasuredArm& arm) {
+  const ur::RobotIdentity& identity = on_network.identity();
+  const ur::UrDelays& delays = on_network.robot().delays();
+  RobotRecord record;
+  record.model = identity.arm_name();
+  record.software = fmt::format("{}.{}.{}", identity.version.major, identity.version.minor, identity.version.bugfix);
+  record.serial = identity.serial_number();
+  record.kinematics_checksums = identity.kinematics.checksums;
+  std::copy_n(arm.model.dh.begin(), record.dh.size(), record.dh.begin());
+  if (arm.near) record.fit = {arm.near->rms_m, arm.near->rms_rad};
+  record.consent_s = delays.consent_s;
+  record.accept_s = delays.accept_s;
+  record.stop_s = delays.stop_s;
+  record.reports = on_network.robot().rtde().counters().reports;
+  record.broken = on_network.robot().rtde().counters().broken;
+  return record;
+}
+
 /// With --resume: the run that a power cut ended between its calibration and its end, if there is one.
 std::optional<CutOffRun> run_to_resume(const RunCommand& command, Narrator& narrator) {
   if (!command.resume || command.scope != RunScope::kEverything) return std::nullopt;
@@ -276,18 +361,48 @@ int run_job(const RunCommand& command) {
 
   std::vector<NamedTarget> boards;  // load_config has refused what is no board
   if (names_boards(config)) boards = targets_of(config).value();
+  sim::ur::TruthReader truth;
+  if (config.robot.given()) {
+    if (config.calibration.touch_test == "yes") {
+      return fail(
+          failure(Fault::kUsage, "calibration.touch_test: the simulated person leads the cell's own arm only").error());
+    }
+    if (const Status followed = follow_true_joints(config, truth); !followed) return fail(followed.error());
+  }
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, boards, config.depth.sensor});
+                                        command.faults, config.workers, boards, config.depth.sensor,
+                                        config.robot.given() ? &truth : nullptr});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);
 
   if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
-  const CartDevices devices{world.arm(), world.color(), world.depth(), world.pendant(), world.panel()};
-  CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored};
+  CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored, {}};
+  RobotNotices notices(narrator);
+  std::unique_ptr<ur::NetworkRobot> on_network;
+  MeasuredArm measured;
+  if (config.robot.given()) {
+    auto connected = connect_robot(config, notices);
+    if (!connected) return fail(connected.error());
+    on_network = std::move(*connected);
+    const auto arm = arm_of(on_network->identity(), config);
+    if (!arm) return fail(arm.error());
+    measured = *arm;
+    facts.arm = measured.model;
+    narrator.line(fmt::format("robot     {} at {}, serial number {}, kinematics as its factory measured them",
+                              config.arm.model, config.robot.host, on_network->identity().serial_number()));
+    if (measured.near) {
+      narrator.line(
+          fmt::format("robot     its frames lie far from the links: taken nearer, the flange is off by {:.2f} "
+                      "mm, {:.2f} mrad RMS",
+                      1e3 * measured.near->rms_m, 1e3 * measured.near->rms_rad));
+    }
+  }
+  const CartDevices devices{on_network ? on_network->robot() : world.arm(), world.color(), world.depth(),
+                            on_network ? on_network->robot().pendant() : world.pendant(), world.panel()};
   CartOptions options;
   options.scope = resumed ? RunScope::kMap : command.scope;
-  options.real_time = command.real_time;
+  options.real_time = command.real_time || on_network != nullptr;  // a robot keeps its own time
   options.journal_path = folder + "/journal.flj";
   std::int64_t boot_heap_bytes = 0;
   const auto make_cart = [&] {
@@ -318,6 +433,14 @@ int run_job(const RunCommand& command) {
   grade(world.grader(), **cart, config, record);
   world.grader().watch(nullptr);
   record.wall.boot_heap_bytes = static_cast<std::uint64_t>(std::max<std::int64_t>(0, boot_heap_bytes));
+  if (on_network) {
+    record.robot = robot_record(*on_network, measured);
+    const ur::UrDelays& delays = on_network->robot().delays();
+    narrator.line(
+        fmt::format("robot     from Play to consent {:.3f} s, to the first motion {:.3f} s; a segment begins within "
+                    "{:.3f} s, a stop stands within {:.3f} s",
+                    delays.consent_s, delays.motion_s, delays.accept_s, delays.stop_s));
+  }
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";
   record.wall.folder = folder;
   narrate_result(record, narrator);
@@ -357,23 +480,33 @@ Result<sim::ur::ExternalControl> external_control_of(const std::string& text) {
 }
 
 int run_ur_sim(const UrSimCommand& command) {
-  const auto identity = sim::ur::identify_controller(command.model, command.seed, command.serial);
-  if (!identity) return fail(identity.error());
   sim::ur::SimulatedUrOptions options;
-  options.running = command.running;
+  std::string model = command.model;
+  if (!command.cell.empty()) {
+    const auto scene = sim::load_cell(command.cell, command.seed);
+    if (!scene) return fail(scene.error());
+    model = scene->arm_model;
+    options.start_rad = scene->start_rad;
+  }
+  const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);
+  if (!identity) return fail(identity.error());
+  options.running = command.running || command.play_after_s >= 0;
   for (const std::string& path : command.programs) {
     const Result<std::string> script = read_text_file(path, sim::ur::kScriptBytesMax);
     if (!script) return fail(script.error());
     options.programs.push_back({std::filesystem::path(path).stem().string() + ".urp", *script, {}});
   }
-  if (!command.external_control.empty()) {
-    const auto external = external_control_of(command.external_control);
+  std::string asked = command.external_control;
+  if (asked.empty() && command.play_after_s >= 0) asked = "127.0.0.1";
+  if (!asked.empty()) {
+    const auto external = external_control_of(asked);
     if (!external) return fail(external.error());
     options.programs.push_back({"external_control.urp", "", *external});
   }
   sim::ur::SimulatedUr robot(*identity, options);
   catch_stop_signals();
-  const Status served = sim::ur::serve_on_tcp(robot, {command.host, command.port_offset});
+  const Status served =
+      sim::ur::serve_on_tcp(robot, {command.host, command.port_offset, !command.cell.empty(), command.play_after_s});
   if (served) return kDone;
   std::fprintf(
       stderr,
@@ -381,6 +514,16 @@ int run_ur_sim(const UrSimCommand& command) {
       "that has it, or choose another --port-offset. Ports below 1024 need root.\n",
       static_cast<int>(served.error().fault), std::string(served.error().detail()).c_str());
   return exit_code_of(served.error());
+}
+
+int run_ur_script(const UrScriptCommand& command) {
+  const std::string script = ur::control_script(command.host, static_cast<std::uint16_t>(command.port));
+  if (command.out == "-") {
+    std::fputs(script.c_str(), stdout);
+  } else if (const Status written = write_file_atomically(command.out, script); !written) {
+    return fail(written.error());
+  }
+  return kDone;
 }
 
 /// Data that nobody received must not look like success: a full disk shows itself only here.
@@ -399,6 +542,7 @@ struct Dispatch {
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const CampaignCommandOptions& c) const { return run_campaign_of(c); }
   int operator()(const UrSimCommand& c) const { return run_ur_sim(c); }
+  int operator()(const UrScriptCommand& c) const { return run_ur_script(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

@@ -77,7 +77,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
 
   RunCommand run;
   ConfigFlags run_flags;
-  std::string only = "everything", sensor = "full", calibration, prior, views;
+  std::string only = "everything", sensor = "full", calibration, prior, views, robot;
   CLI::App* run_app = app.add_subcommand("run", "the whole job or a part of it, in a simulated cell");
   run_flags.add_to(*run_app);
   run_app->add_option("--only", only, "a part of the job; map and verify test a stored calibration first")
@@ -94,6 +94,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->check(CLI::IsMember({"full", "fast"}));
   run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
   run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
+  run_app->add_option("--robot", robot,
+                      "address of a Universal Robots controller that moves the arm (robot.host), at the pace of the "
+                      "clock; what the cameras see of it is simulated: `firstlook ur-sim --cell ...` there");
   run_app->add_flag("--record", run.record,
                     "keep the views of the board as a dataset that `firstlook calibrate` reads");
   run_app->add_flag("--resume", run.resume,
@@ -227,6 +230,22 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       "--external-control", ur_sim.external_control,
       "HOST or HOST:PORT (50002): whom the program external_control.urp asks for its script at Play");
 
+  ur_sim_app->add_option("--cell", ur_sim.cell,
+                         "simulated cell whose arm this is: it stands as the cell's does, and tells its true joints to "
+                         "the cameras of `firstlook run --robot`; --seed as there");
+  ur_sim_app->add_option("--play-after", ur_sim.play_after_s,
+                         "so many seconds after the start somebody presses Play on external_control.urp, again every "
+                         "3 s until it runs");
+
+  UrScriptCommand ur_script;
+  CLI::App* ur_script_app =
+      app.add_subcommand("ur-script", "the robot's program as a file, for pendants without the External Control URCap");
+  ur_script_app->add_option("--host", ur_script.host, "address of this computer as the controller sees it")->required();
+  ur_script_app->add_option("--port", ur_script.port, "robot.control_port")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  ur_script_app->add_option("-o,--out", ur_script.out, "file to write; -: stdout")->capture_default_str();
+
   ReplayCommand replay;
   CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
   replay_app->add_option("journal", replay.journal, "journal.flj of a run")->required();
@@ -262,6 +281,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       run.sources.flags.push_back({"calibration.stored", calibration, "--calibration"});
     }
     if (!views.empty()) run.sources.flags.push_back({"explore.views", views, "--views"});
+    if (!robot.empty()) run.sources.flags.push_back({"robot.host", robot, "--robot"});
     if (!prior.empty()) run.sources.flags.push_back({"map.prior", prior, "--prior-map"});
     run.fast_sensor = sensor == "fast";
     return {run, 0};
@@ -282,6 +302,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   if (board_app->parsed()) return {board, 0};
   if (campaign_app->parsed()) return {campaign, 0};
   if (ur_sim_app->parsed()) return {ur_sim, 0};
+  if (ur_script_app->parsed()) return {ur_script, 0};
   if (replay_app->parsed()) return {replay, 0};
   if (states_app->parsed()) return {StatesCommand{}, 0};
   if (explain_app->parsed()) return {explain, 0};

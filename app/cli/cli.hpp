@@ -30,6 +30,11 @@ struct RunCommand {
   std::string out;  ///< empty: runs/<date>-<seed>
   std::string faults;
 };
+struct UrScriptCommand {
+  std::string host;  ///< of this computer, as the controller sees it
+  int port = 50001;
+  std::string out = "firstlook.script";  ///< "-": stdout
+};
 struct ReplayCommand {
   std::string journal;
 };
@@ -46,11 +51,13 @@ struct UrSimCommand {
   bool running = false;               ///< starts with the brakes released
   std::vector<std::string> programs;  ///< URScript files that `load` finds
   std::string external_control;       ///< HOST or HOST:PORT; empty: no such program
+  std::string cell;                   ///< where the arm stands; its true joints are told to the cell's cameras
+  double play_after_s = -1;           ///< somebody presses Play; below 0: nobody
 };
 
 using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,
                              BoardCommandOptions, CampaignCommandOptions, ReplayCommand, StatesCommand, ExplainCommand,
-                             ConfigCommandOptions, UrSimCommand>;
+                             ConfigCommandOptions, UrSimCommand, UrScriptCommand>;
 
 /// Either a command, or the exit code after help, version or an error of usage were printed.
 struct ParsedCommandLine {

@@ -50,6 +50,40 @@ void add_arm_keys(Keys& keys, Config& c) {
                   "joints where a job ends, inside the safe zone; null: the arm's own default"});
 }
 
+void add_robot_keys(Keys& keys, Config& c) {
+  keys.push_back({"robot.host",
+                  &c.robot.host,
+                  0,
+                  0,
+                  {},
+                  "name or address of a Universal Robots controller, CB3 or e-Series; none: the simulated cell's arm"});
+  keys.push_back({"robot.own_address",
+                  &c.robot.own_address,
+                  0,
+                  0,
+                  {},
+                  "this computer's address as the controller sees it; auto: that of the network towards it"});
+  keys.push_back({"robot.program_port",
+                  &c.robot.program_port,
+                  1,
+                  65535,
+                  {},
+                  "here the External Control URCap asks for the program: the port that its installation page names"});
+  keys.push_back({"robot.control_port", &c.robot.control_port, 1, 65535, {}, "here that program asks for commands"});
+  keys.push_back({"robot.port_offset",
+                  &c.robot.port_offset,
+                  -29000,
+                  35000,
+                  {},
+                  "added to the controller's ports: simulated ones"});
+  keys.push_back({"robot.payload_kg",
+                  &c.robot.payload_kg,
+                  -1,
+                  100,
+                  {},
+                  "that must be set in the controller, else the job is refused; -1: whatever is set there"});
+}
+
 void add_space_keys(Keys& keys, Config& c) {
   keys.push_back({"safe_zone.radius_m",
                   &c.safe_zone.radius_m,
@@ -389,6 +423,7 @@ std::vector<ConfigKey> config_keys(Config& config) {
   Keys keys;
   add_job_keys(keys, config);
   add_arm_keys(keys, config);
+  add_robot_keys(keys, config);
   add_space_keys(keys, config);
   add_calibration_keys(keys, config);
   add_depth_keys(keys, config);
@@ -455,6 +490,7 @@ std::string broken_rule(const Config& c) {
   if (c.calibration.touch_tip == "estimate" && c.calibration.touch_corners < 4) {
     return "calibration.touch_corners must be 4 at least when the tip is estimated";
   }
+  if (c.robot.program_port == c.robot.control_port) return "robot.program_port and robot.control_port must differ";
   if (const auto targets = targets_of(c); !targets) return std::string(targets.error().detail());
   // Three views are the fewest that can determine a hand-eye transform (two motions about different axes).
   if (c.calibration.views_min - c.calibration.holdout_views < 3) {

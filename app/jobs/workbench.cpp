@@ -74,7 +74,7 @@ ClearanceInputs clearance_inputs(const Config& config) {
 Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const CellFacts& facts,
                                                    hal::ColorCamera& color, hal::DepthCamera& depth,
                                                    WorkerPool& workers) {
-  const auto arm = find_arm_model(config.arm.model);
+  const auto arm = facts.arm ? facts.arm : find_arm_model(config.arm.model);
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
   if (facts.stored) {
     const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth,

@@ -24,6 +24,16 @@ std::string provenance_section(const RunRecord& record) {
   HtmlTable table({"", ""}, 2);
   table.row({"firstlook", p.version});
   table.row({"arm", p.arm_model});
+  if (record.robot) {
+    const RobotRecord& robot = *record.robot;
+    table.row({"robot", fmt::format("{}, software {}, serial number {}", robot.model, robot.software,
+                                    robot.serial.empty() ? "not told" : robot.serial)});
+    std::string sums;
+    for (const std::uint32_t sum : robot.kinematics_checksums) sums += fmt::format("{:08x} ", sum);
+    table.row({"its kinematics as measured in the factory, checksums", sums});
+    table.row({"longest from its program's connection to consent, from command to motion, from stop to standstill",
+               fmt::format("{:.3f}, {:.3f}, {:.3f} s", robot.consent_s, robot.accept_s, robot.stop_s)});
+  }
   table.row({"cell", record.cell});
   table.row({"seed", fmt::format("{}", record.seed)});
   if (!p.sensor.empty()) table.row({"simulated sensors", p.sensor});

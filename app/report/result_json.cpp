@@ -77,6 +77,27 @@ Json safety_json(const SafetyRecord& safety) {
           {"stops", stops}};
 }
 
+Json robot_json(const RobotRecord& robot) {
+  Json checksums = Json::array(), rows = Json::array();
+  for (const std::uint32_t checksum : robot.kinematics_checksums) checksums.push_back(fmt::format("{:08x}", checksum));
+  for (const DhRow& row : robot.dh) {
+    rows.push_back(
+        {{"theta_rad", row.theta_offset_rad}, {"d_m", row.d_m}, {"a_m", row.a_m}, {"alpha_rad", row.alpha_rad}});
+  }
+  return {{"model", robot.model},
+          {"software", robot.software},
+          {"serial", robot.serial.empty() ? Json(nullptr) : Json(robot.serial)},
+          {"kinematics",
+           {{"checksums", checksums},
+            {"dh", rows},
+            {"fit", robot.fit ? Json{{"rms_m", robot.fit->rms_m}, {"rms_rad", robot.fit->rms_rad}} : Json(nullptr)}}},
+          {"play_to_consent_s", robot.consent_s},
+          {"segment_begins_within_s", robot.accept_s},
+          {"stop_stands_within_s", robot.stop_s},
+          {"joint_reports", robot.reports},
+          {"streams_broken", robot.broken}};
+}
+
 Json memory_json(const MemoryRecord& memory) {
   return {{"budget_bytes", memory.budget_bytes},
           {"peak_bytes", memory.peak_bytes},
@@ -167,6 +188,7 @@ std::string result_json(const RunRecord& record) {
   json["time_offset"] = aligned ? Json(time_offset_json(*record.alignment)) : Json(nullptr);
   json["mapping"] = record.mapping ? mapping_json(*record.mapping) : Json(nullptr);
   json["safety"] = record.safety ? safety_json(*record.safety) : Json(nullptr);
+  json["robot"] = record.robot ? robot_json(*record.robot) : Json(nullptr);
   json["memory"] = record.memory ? memory_json(*record.memory) : Json(nullptr);
   json["wall"] = wall_json(record.wall);
   json["truth"] = record.truth ? truth_json(*record.truth) : Json(nullptr);

@@ -15,6 +15,7 @@
 #include "algorithms/calibration/time_offset.hpp"
 #include "algorithms/calibration/verdict.hpp"
 #include "algorithms/calibration/verification.hpp"
+#include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/mapping/frame_gate.hpp"
 #include "algorithms/mapping/map_change.hpp"
 #include "algorithms/mapping/map_planes.hpp"
@@ -263,12 +264,32 @@ struct FaultRecord {
   std::string detail;
 };
 
+/// The robot on the network, as it told of itself, and how it answered.
+struct RobotRecord {
+  std::string model;     ///< as ArmModel names it
+  std::string software;  ///< "3.15.8"
+  std::string serial;    ///< empty: the controller is too old to tell
+  std::array<std::uint32_t, 6> kinematics_checksums{};
+  std::array<DhRow, 6> dh{};  ///< with the factory's correction; what the arm model of the run had
+  /// Where the factory's table has frames far from the links, `dh` is fitted: what it lacks at the flange, RMS.
+  struct Fit {
+    double rms_m = 0, rms_rad = 0;
+  };
+  std::optional<Fit> fit;
+  double consent_s = 0;       ///< the longest from the program's connection until it could be moved
+  double accept_s = 0;        ///< and from a segment's command until the program had begun it
+  double stop_s = 0;          ///< and from a command to stop until the arm stood
+  std::uint64_t reports = 0;  ///< of the joints
+  std::uint64_t broken = 0;   ///< streams of reports that were given up
+};
+
 /// Where the run came from, as far as it does not change from machine to machine.
 struct Provenance {
   std::string version;
   std::string arm_model;
-  std::string sensor;       ///< "full" or "fast"
-  std::string config_yaml;  ///< print_config of what the run used
+  std::uint64_t kinematics = 0;  ///< kinematics_checksum of the arm's model in this run; 0: as published
+  std::string sensor;            ///< "full" or "fast"
+  std::string config_yaml;       ///< print_config of what the run used
   std::string journal_hash;
 };
 
@@ -329,6 +350,7 @@ struct RunRecord {
   std::optional<MappingRecord> mapping;
   std::vector<MapPicture> map_pictures;
   std::optional<SafetyRecord> safety;
+  std::optional<RobotRecord> robot;  ///< empty: the arm of the simulated cell, or recorded data
   std::optional<MemoryRecord> memory;
   std::vector<FaultRecord> faults;
   Provenance provenance;

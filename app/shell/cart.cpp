@@ -336,6 +336,7 @@ void Cart::fill_calibration(RunRecord& record) const {
   record.alignment = bench_->alignment();
   record.verified = bench_->verified();
   record.provenance.arm_model = config_.arm.model;
+  record.provenance.kinematics = kinematics_checksum(bench_->arm());
 }
 
 RunRecord Cart::record() const {

@@ -1,8 +1,13 @@
 #include "hal/sim/frame_clock.hpp"
 
+#include <algorithm>
+
 #include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook::sim {
+namespace {
+constexpr Duration kRetry = milliseconds(2);
+}
 
 bool FrameClock::dropped(std::uint32_t sequence) const {
   if (timing_.drop_share <= 0) return false;
@@ -27,6 +32,10 @@ std::optional<hal::Frame> FrameClock::poll(Instant now) {
   arm_.advance(now);
   std::optional<std::uint32_t> newest;
   for (; exposed(next_) + timing_.transfer <= now && !stalled(next_); ++next_) {
+    if (exposed(next_) > arm_.known_until()) {
+      retry_ = now + kRetry;
+      break;
+    }
     ++counters_.frames;
     if (dropped(next_)) {
       ++counters_.lost;
@@ -38,7 +47,9 @@ std::optional<hal::Frame> FrameClock::poll(Instant now) {
   return keep(*newest);
 }
 
-Instant FrameClock::next_due() const { return stalled(next_) ? kNeverDue : exposed(next_) + timing_.transfer; }
+Instant FrameClock::next_due() const {
+  return stalled(next_) ? kNeverDue : std::max(retry_, exposed(next_) + timing_.transfer);
+}
 
 Result<ExposedFrame> FrameClock::find(const hal::Frame& frame) const {
   const std::scoped_lock lock(mutex_);

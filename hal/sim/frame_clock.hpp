@@ -7,7 +7,8 @@
 #include <optional>
 
 #include "hal/api/cameras.hpp"
-#include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/true_motion.hpp"
+#include "platform/core/random.hpp"
 
 namespace firstlook::sim {
 
@@ -36,7 +37,7 @@ class FrameClock {
  public:
   static constexpr std::uint32_t kSlots = 64;
 
-  FrameClock(const FrameTiming& timing, SimulatedArm& arm) : timing_(timing), arm_(arm) {}
+  FrameClock(const FrameTiming& timing, TrueMotion& arm) : timing_(timing), arm_(arm) {}
 
   /// Loop thread; frames that come between two calls are counted and skipped.
   [[nodiscard]] std::optional<hal::Frame> poll(Instant now);
@@ -52,8 +53,9 @@ class FrameClock {
   [[nodiscard]] hal::Frame keep(std::uint32_t sequence);
 
   FrameTiming timing_;
-  SimulatedArm& arm_;
+  TrueMotion& arm_;
   std::uint32_t next_ = 0;
+  Instant retry_{};  ///< a frame is due, but where the arm was is not known yet
   hal::StreamCounters counters_;
   ExposedFrame shown_;  ///< the last picture taken before a freeze
   mutable std::mutex mutex_;

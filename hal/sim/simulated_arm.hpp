@@ -9,6 +9,7 @@
 #include "hal/api/robot_arm.hpp"
 #include "hal/sim/joint_motion.hpp"
 #include "hal/sim/pose_deviation.hpp"
+#include "hal/sim/true_motion.hpp"
 #include "platform/core/fixed_vector.hpp"
 #include "platform/core/random.hpp"
 #include "platform/core/transform.hpp"
@@ -16,18 +17,6 @@
 namespace firstlook::sim {
 
 inline constexpr Duration kReportPeriod = milliseconds(8);  // RTDE of a CB3 controller: 125 Hz
-inline constexpr Instant kNeverDue{INT64_MAX / 2};
-
-/// Told where the true body moved between two reports; lives on the loop thread and must not allocate.
-class BodyWatcher {
- public:
-  virtual ~BodyWatcher() = default;
-  /// The body went from one set of true joint angles to the other. Returns true when it is in contact with the scene.
-  virtual bool body_moved(Instant stamp, const JointVector& from_rad, const JointVector& to_rad) = 0;
-  /// A person moves the body by hand, or it stands where a person left it: what it meets there is not the program's
-  /// doing. What comes next is judged afresh.
-  virtual void body_led() = 0;
-};
 
 /// What a person or a mishap does to the controller.
 enum class ControllerAction : std::uint8_t { kPlay, kPause, kStop, kProtectiveStop, kEmergencyStop, kLinkLost };
@@ -50,7 +39,7 @@ struct SimulatedArmOptions {
 
 /// All calls but true_flange from the loop thread. Time only moves forward: a call with an earlier `now` changes
 /// nothing.
-class SimulatedArm final : public hal::RobotArm {
+class SimulatedArm final : public hal::RobotArm, public TrueMotion {
  public:
   explicit SimulatedArm(const SimulatedArmOptions& options, BodyWatcher* watcher = nullptr);
 
@@ -66,11 +55,11 @@ class SimulatedArm final : public hal::RobotArm {
   [[nodiscard]] std::optional<double> lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2,
                                            Instant now);
   /// Lets the controller run up to `now`; reports pile up for poll.
-  void advance(Instant now);
+  void advance(Instant now) override;
+  [[nodiscard]] Instant known_until() const override { return simulated_; }
   /// Where the joints truly are or were, ring-down included. Back to kMotionsKept moves before the newest.
-  [[nodiscard]] JointVector true_joints(Instant stamp) const;
-  /// Where the flange truly is for true joint angles: the model's pose and the arm's own deviation. Any thread.
-  [[nodiscard]] Transform<Base, Flange> true_flange(const JointVector& true_joints_rad) const;
+  [[nodiscard]] JointVector true_joints(Instant stamp) const override;
+  [[nodiscard]] Transform<Base, Flange> true_flange(const JointVector& true_joints_rad) const override;
 
  private:
   static constexpr std::size_t kMotionsKept = 64;

@@ -16,7 +16,7 @@ Status check_size(const Image& image, const CameraIntrinsics& intrinsics) {
 
 }  // namespace
 
-CameraRig::CameraRig(const ArmModel& model, const CameraMount& mount, const SimulatedArm& arm)
+CameraRig::CameraRig(const ArmModel& model, const CameraMount& mount, const TrueMotion& arm)
     : model_(model), mount_(mount), body_(true_capsules(model, mount.link, mount.link_T_camera)), arm_(arm) {}
 
 Transform<Base, Camera> CameraRig::base_T_camera(const JointVector& true_joints_rad) const {
@@ -34,7 +34,7 @@ Exposure CameraRig::exposure(const ExposedFrame& frame, std::uint64_t seed) cons
   return {place(body_, forward(model_, frame.true_joints_rad)), seed, frame.picture};
 }
 
-SimulatedColorCamera::SimulatedColorCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig,
+SimulatedColorCamera::SimulatedColorCamera(const FrameTiming& timing, TrueMotion& arm, const CameraRig& rig,
                                            const SceneHistory& scenes, const CameraIntrinsics& stated,
                                            bool delivers_corners)
     : clock_(timing, arm),
@@ -74,7 +74,7 @@ std::optional<hal::CornerObservation> SimulatedColorCamera::read_corners(const h
                                 static_cast<std::size_t>(target));
 }
 
-SimulatedDepthCamera::SimulatedDepthCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig,
+SimulatedDepthCamera::SimulatedDepthCamera(const FrameTiming& timing, TrueMotion& arm, const CameraRig& rig,
                                            const SceneHistory& scenes, DepthDetail detail)
     : clock_(timing, arm),
       rig_(rig),

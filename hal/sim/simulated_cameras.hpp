@@ -4,14 +4,14 @@
 #include "hal/api/cameras.hpp"
 #include "hal/sim/frame_clock.hpp"
 #include "hal/sim/scene_history.hpp"
-#include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/true_motion.hpp"
 
 namespace firstlook::sim {
 
 /// Where arm and cameras truly are for true joint angles. Thread-safe.
 class CameraRig {
  public:
-  CameraRig(const ArmModel& model, const CameraMount& mount, const SimulatedArm& arm);
+  CameraRig(const ArmModel& model, const CameraMount& mount, const TrueMotion& arm);
   [[nodiscard]] Transform<Base, Camera> base_T_camera(const JointVector& true_joints_rad) const;
   [[nodiscard]] Transform<Base, Depth> base_T_depth(const JointVector& true_joints_rad) const;
   /// What stands in the way of light: the true body with the camera's housing.
@@ -21,14 +21,14 @@ class CameraRig {
   ArmModel model_;
   CameraMount mount_;
   Capsules body_;
-  const SimulatedArm& arm_;
+  const TrueMotion& arm_;
 };
 
 /// poll, next_due and counters from the loop thread, read and read_corners from any.
 class SimulatedColorCamera final : public hal::ColorCamera {
  public:
   /// @param stated  what it says of itself; pictures are made with the scene's
-  SimulatedColorCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig, const SceneHistory& scenes,
+  SimulatedColorCamera(const FrameTiming& timing, TrueMotion& arm, const CameraRig& rig, const SceneHistory& scenes,
                        const CameraIntrinsics& stated, bool delivers_corners);
 
   [[nodiscard]] const CameraIntrinsics& intrinsics() const override { return intrinsics_; }
@@ -51,7 +51,7 @@ class SimulatedColorCamera final : public hal::ColorCamera {
 
 class SimulatedDepthCamera final : public hal::DepthCamera {
  public:
-  SimulatedDepthCamera(const FrameTiming& timing, SimulatedArm& arm, const CameraRig& rig, const SceneHistory& scenes,
+  SimulatedDepthCamera(const FrameTiming& timing, TrueMotion& arm, const CameraRig& rig, const SceneHistory& scenes,
                        DepthDetail detail);
 
   [[nodiscard]] const CameraIntrinsics& intrinsics() const override { return intrinsics_; }

@@ -5,6 +5,7 @@
 #include "algorithms/kinematics/arm_model.hpp"
 #include "hal/sim/cell_file.hpp"
 #include "hal/sim/faults.hpp"
+#include "hal/sim/followed_arm.hpp"
 #include "hal/sim/random_streams.hpp"
 #include "hal/sim/scene_history.hpp"
 #include "hal/sim/simulated_arm.hpp"
@@ -137,6 +138,11 @@ SimulatedArmOptions arm_options(const Scene& scene, const ArmModel& model, const
   return options;
 }
 
+std::optional<FollowedArm> follow(const SimulationOptions& options, const ArmModel& model, BodyWatcher& watcher) {
+  if (options.feed == nullptr) return std::nullopt;
+  return std::optional<FollowedArm>(std::in_place, *options.feed, model, options.seed, DeviationSigmas{}, &watcher);
+}
+
 /// Hangs the boards that are looked for in place of the cell's, and puts them first.
 Status hang_boards(std::span<const NamedTarget> boards, Scene& scene) {
   for (std::size_t k = 0; k < boards.size(); ++k) {
@@ -171,10 +177,12 @@ class Cell final : public SimulatedCell {
         description_(describe_cell(scene_, first_.renderer, faults, options)),
         grader_(truth_of(scene_, model, first_, faults, options), workers_),
         watcher_(grader_, scenes_),
-        arm_(arm_options(scene_, model, faults, options.seed), &watcher_),
-        rig_(model, scene_.mount, arm_),
-        color_(color_timing(faults, options.seed), arm_, rig_, scenes_, description_.color, options.fast_sensor),
-        depth_(depth_timing(faults, options.seed), arm_, rig_, scenes_, detail(options)),
+        arm_(arm_options(scene_, model, faults, options.seed), options.feed == nullptr ? &watcher_ : nullptr),
+        followed_(follow(options, model, watcher_)),
+        motion_(followed_ ? static_cast<TrueMotion&>(*followed_) : arm_),
+        rig_(model, scene_.mount, motion_),
+        color_(color_timing(faults, options.seed), motion_, rig_, scenes_, description_.color, options.fast_sensor),
+        depth_(depth_timing(faults, options.seed), motion_, rig_, scenes_, detail(options)),
         hand_(scene_, model, faults, options.seed, arm_),
         pendant_(pendant_script(faults), &hand_),
         panel_(panel_script(faults)) {}
@@ -196,6 +204,8 @@ class Cell final : public SimulatedCell {
   TruthGrader grader_;
   GraderInTime watcher_;
   SimulatedArm arm_;
+  std::optional<FollowedArm> followed_;
+  TrueMotion& motion_;
   CameraRig rig_;
   SimulatedColorCamera color_;
   SimulatedDepthCamera depth_;
@@ -213,10 +223,16 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   Result<Scene> scene = load_cell(options.cell, options.seed);
   if (!scene) return std::unexpected(scene.error());
   if (const Status hung = hang_boards(options.boards, *scene); !hung) return std::unexpected(hung.error());
-  const std::optional<ArmModel> model = find_arm_model(scene->arm_model);
+  std::optional<ArmModel> model = find_arm_model(scene->arm_model);
   if (!model) return failure(Fault::kCellInvalid, "{}: no arm model '{}'", scene->name, scene->arm_model);
   if (scene->start_rad.size() != model->joints) {
     return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, model->joints);
+  }
+  if (options.feed != nullptr) {
+    if (acts_on_arm(*faults)) {
+      return failure(Fault::kUsage, "--faults: what happens to arm, link and operator is up to the robot's simulation");
+    }
+    model->dh = options.feed->true_dh();
   }
   const std::optional<SensorPreset> sensor = find_sensor_preset(options.sensor);
   if (!sensor) return failure(Fault::kUsage, "no depth sensor '{}'", options.sensor);

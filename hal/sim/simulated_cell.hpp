@@ -12,6 +12,7 @@
 #include "hal/api/cameras.hpp"
 #include "hal/api/operator_devices.hpp"
 #include "hal/api/robot_arm.hpp"
+#include "hal/sim/followed_arm.hpp"
 #include "hal/sim/grader.hpp"
 #include "platform/core/camera_intrinsics.hpp"
 #include "platform/core/joint_vector.hpp"
@@ -30,6 +31,9 @@ struct SimulationOptions {
   /// only one. Empty: the cell's own boards. The colour camera counts them in this order.
   std::vector<NamedTarget> boards{};
   std::string sensor = "kinect";  ///< sensor_presets.hpp
+  /// Where the true joints come from when another process moves the arm, and it is not the cell's; null: the cell's own
+  /// arm moves. Outlives the cell.
+  TrueJointFeed* feed = nullptr;
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.
@@ -59,6 +63,7 @@ class SimulatedCell {
  public:
   virtual ~SimulatedCell() = default;
   [[nodiscard]] virtual const CellDescription& description() const = 0;
+  /// Arm, pendant and person of a cell whose arm is moved elsewhere do nothing.
   [[nodiscard]] virtual hal::RobotArm& arm() = 0;
   [[nodiscard]] virtual hal::ColorCamera& color() = 0;
   [[nodiscard]] virtual hal::DepthCamera& depth() = 0;
@@ -69,8 +74,8 @@ class SimulatedCell {
 };
 
 /// Builds a cell from its options. Errors: kCellInvalid for a cell that cannot be used, kUsage for a fault
-/// specification that is not understood, kConfigBadValue for boards that the cell has no place for, kDataMissing for a
-/// file that cannot be opened.
+/// specification that is not understood or acts on an arm that is moved elsewhere, kConfigBadValue for boards that the
+/// cell has no place for, kDataMissing for a file that cannot be opened.
 [[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options);
 
 }  // namespace firstlook::sim

@@ -1,7 +1,6 @@
 #include "hal/ur/rtde_codec.hpp"
 
 #include <algorithm>
-#include <bit>
 
 namespace firstlook::ur {
 namespace {
@@ -25,25 +24,18 @@ constexpr TypeRow kTypes[] = {
     {"VECTOR6D", RtdeType::kVector6d, 6, 8},
     {"VECTOR6INT32", RtdeType::kVector6Int32, 6, 4},
     {"VECTOR6UINT32", RtdeType::kVector6Uint32, 6, 4},
+    {"NOT_FOUND", RtdeType::kNotFound, 0, 0},
 };
 
 const TypeRow& row_of(RtdeType type) { return kTypes[static_cast<std::size_t>(type)]; }
 
-void put(std::string& out, std::uint64_t value, int bytes) {
-  for (int shift = 8 * (bytes - 1); shift >= 0; shift -= 8) out.push_back(static_cast<char>(value >> shift));
-}
-
-std::uint64_t number_at(std::string_view bytes, std::size_t at, std::size_t count) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < count; ++i) value = value << 8 | static_cast<std::uint8_t>(bytes[at + i]);
-  return value;
-}
-
-std::string request(char kind, std::string_view payload) {
-  std::string bytes;
-  put(bytes, kHeaderBytes + payload.size(), 2);
-  bytes.push_back(kind);
-  bytes.append(payload);
+/// A request whose payload begins with `head`.
+RtdeRequest request(char kind, std::string_view head, std::string_view names = {}) {
+  RtdeRequest bytes;
+  bytes.number(kHeaderBytes + head.size() + names.size(), 2);
+  bytes.byte(kind);
+  bytes.text(head);
+  bytes.text(names);
   return bytes;
 }
 
@@ -72,39 +64,35 @@ double value_at(RtdeType type, std::string_view bytes, std::size_t at) {
 
 }  // namespace
 
-Result<std::optional<RtdePackage>> RtdeReader::next() {
-  received_.erase(0, taken_);
-  taken_ = 0;
-  if (received_.size() < kHeaderBytes) return std::nullopt;
-  const std::size_t size = number_at(received_, 0, 2);
+Result<std::optional<RtdePackage>> rtde_cut(std::string_view received) {
+  if (received.size() < kHeaderBytes) return std::nullopt;
+  const std::size_t size = number_at(received, 0, 2);
   if (size < kHeaderBytes) return failure(Fault::kLinkLost, "RTDE: a package of {} bytes", size);
-  if (kKinds.find(received_[2]) == std::string_view::npos) {
-    return failure(Fault::kLinkLost, "RTDE: a package of kind {}", static_cast<std::uint8_t>(received_[2]));
+  if (kKinds.find(received[2]) == std::string_view::npos) {
+    return failure(Fault::kLinkLost, "RTDE: a package of kind {}", static_cast<std::uint8_t>(received[2]));
   }
-  if (received_.size() < size) return std::nullopt;
-  taken_ = size;
-  return RtdePackage{static_cast<RtdeKind>(received_[2]),
-                     std::string_view(received_).substr(kHeaderBytes, size - kHeaderBytes)};
+  if (received.size() < size) return std::nullopt;
+  return RtdePackage{static_cast<RtdeKind>(received[2]), received.substr(kHeaderBytes, size - kHeaderBytes), size};
 }
 
-std::string rtde_protocol_request(std::uint16_t version) {
-  std::string payload;
-  put(payload, version, 2);
-  return request('V', payload);
+RtdeRequest rtde_protocol_request(std::uint16_t version) {
+  Message<2> payload;
+  payload.number(version, 2);
+  return request('V', payload.view());
 }
 
-std::string rtde_version_request() { return request('v', {}); }
+RtdeRequest rtde_version_request() { return request('v', {}); }
 
-std::string rtde_outputs_request(double frequency_hz, std::string_view names) {
-  std::string payload;
-  put(payload, std::bit_cast<std::uint64_t>(frequency_hz), 8);
-  payload.append(names);
-  return request('O', payload);
+RtdeRequest rtde_outputs_request(int protocol, double frequency_hz, std::string_view names) {
+  if (protocol == 1) return request('O', names);
+  Message<8> frequency;
+  frequency.real(frequency_hz);
+  return request('O', frequency.view(), names);
 }
 
-std::string rtde_inputs_request(std::string_view names) { return request('I', names); }
-std::string rtde_start_request() { return request('S', {}); }
-std::string rtde_pause_request() { return request('P', {}); }
+RtdeRequest rtde_inputs_request(std::string_view names) { return request('I', names); }
+RtdeRequest rtde_start_request() { return request('S', {}); }
+RtdeRequest rtde_pause_request() { return request('P', {}); }
 
 Result<bool> rtde_accepted(std::string_view payload) {
   if (payload.size() != 1) return failure(Fault::kLinkLost, "RTDE: an answer of {} bytes", payload.size());
@@ -119,41 +107,58 @@ Result<std::array<std::uint32_t, 4>> rtde_version(std::string_view payload) {
 }
 
 std::size_t RtdeRecipe::data_bytes() const {
-  std::size_t bytes = 1;
+  std::size_t bytes = numbered ? 1 : 0;
   for (const RtdeType type : types) bytes += row_of(type).count * row_of(type).bytes;
   return bytes;
 }
 
-Result<RtdeRecipe> rtde_recipe(std::string_view payload, std::string_view names) {
-  if (payload.empty()) return failure(Fault::kLinkLost, "RTDE: an empty answer to a recipe");
+std::size_t RtdeRecipe::values() const {
+  std::size_t count = 0;
+  for (const RtdeType type : types) count += row_of(type).count;
+  return count;
+}
+
+bool RtdeRecipe::complete() const { return std::ranges::find(types, RtdeType::kNotFound) == types.end(); }
+
+Result<RtdeRecipe> rtde_recipe(int protocol, std::string_view payload, std::string_view names) {
   RtdeRecipe recipe;
-  recipe.number = static_cast<std::uint8_t>(payload[0]);
-  std::string_view words = payload.substr(1);
-  while (!words.empty() && !names.empty()) {
-    const std::string_view word = next_word(words), name = next_word(names);
-    if (word == "NOT_FOUND") return failure(Fault::kDeviceMissing, "RTDE: the controller has no '{}'", name);
-    if (word == "IN_USE") return failure(Fault::kDeviceMissing, "RTDE: another client controls '{}'", name);
+  recipe.numbered = protocol != 1;
+  if (recipe.numbered) {
+    if (payload.empty()) return failure(Fault::kLinkLost, "RTDE: an empty answer to a recipe");
+    recipe.number = static_cast<std::uint8_t>(payload[0]);
+    payload.remove_prefix(1);
+  }
+  while (!payload.empty() && !names.empty() && !recipe.types.full()) {
+    const std::string_view word = next_word(payload), name = next_word(names);
+    if (word == "IN_USE") return failure(Fault::kDeviceMissing, "RTDE: another client controls '{:.60}'", name);
     const auto row = std::ranges::find(kTypes, word, &TypeRow::name);
-    if (row == std::end(kTypes)) return failure(Fault::kLinkLost, "RTDE: '{}' is of type '{}'", name, word);
+    if (row == std::end(kTypes)) return failure(Fault::kLinkLost, "RTDE: '{:.60}' is of type '{:.60}'", name, word);
     recipe.types.push_back(row->type);
   }
-  if (!words.empty() || !names.empty()) return failure(Fault::kLinkLost, "RTDE: not one type for each name");
+  if (!payload.empty() || !names.empty()) return failure(Fault::kLinkLost, "RTDE: not one type for each name");
   return recipe;
 }
 
-Result<std::vector<double>> rtde_values(const RtdeRecipe& recipe, std::string_view payload) {
-  if (payload.size() != recipe.data_bytes() || static_cast<std::uint8_t>(payload[0]) != recipe.number) {
+Status rtde_values(const RtdeRecipe& recipe, std::string_view payload, std::span<double> values) {
+  ENSURE(5304, values.size() >= recipe.values());
+  const bool other = recipe.numbered && !payload.empty() && static_cast<std::uint8_t>(payload[0]) != recipe.number;
+  if (payload.size() != recipe.data_bytes() || other) {
     return failure(Fault::kLinkLost, "RTDE: {} bytes of data, {} expected of recipe {}", payload.size(),
                    recipe.data_bytes(), recipe.number);
   }
-  std::vector<double> values;
-  std::size_t at = 1;
+  std::size_t at = recipe.numbered ? 1 : 0, value = 0;
   for (const RtdeType type : recipe.types) {
     for (std::size_t i = 0; i < row_of(type).count; ++i, at += row_of(type).bytes) {
-      values.push_back(value_at(type, payload, at));
+      values[value++] = value_at(type, payload, at);
     }
   }
-  return values;
+  return {};
+}
+
+std::string_view rtde_text(int protocol, std::string_view payload) {
+  if (payload.empty()) return {};
+  if (protocol == 1) return payload.substr(1);
+  return payload.substr(1, static_cast<std::uint8_t>(payload[0]));
 }
 
 }  // namespace firstlook::ur

@@ -3,6 +3,7 @@
 
 #include "algorithms/kinematics/arm_model.hpp"
 #include "hal/sim/simulated_arm.hpp"
+#include "tests/support/driven_ur.hpp"
 #include "tests/support/mock_robot_arm.hpp"
 
 using namespace firstlook;
@@ -38,6 +39,18 @@ struct Mock {
   mock::MockRobotArm arm;
 };
 
+/// The driver of a UR arm with a simulated controller behind it; its program takes half a second to be let in.
+struct Ur {
+  Ur() : arm("ur5") {
+    arm.ur.robot.controller().place(kStart);
+    arm.at(at(0.1), [](test::DrivenUr& a) { a.play(); });
+    arm.at(at(5), [](test::DrivenUr& a) { REQUIRE(a.ur.dashboard("pause") == "Pausing program"); });
+    arm.at(at(6), [](test::DrivenUr& a) { a.play(); });
+    arm.at(at(9), [](test::DrivenUr& a) { a.ur.robot.controller().protective_stop("a test"); });
+  }
+  test::DrivenUr arm;
+};
+
 hal::ArmState latest(hal::RobotArm& arm, Instant now) {
   std::optional<hal::ArmState> last;
   while (const auto state = arm.poll(now)) last = state;
@@ -56,7 +69,7 @@ constexpr double kNoise_rad = 5e-4;
 }  // namespace
 
 TEMPLATE_TEST_CASE("an arm reports in order, never from the future, and says when the next is due", "[hal][arm]",
-                   Simulated, Mock) {
+                   Simulated, Mock, Ur) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   CHECK(std::string(arm.model()) == "ur5");
@@ -78,7 +91,7 @@ TEMPLATE_TEST_CASE("an arm reports in order, never from the future, and says whe
   CHECK(arm.counters().states == count);
 }
 
-TEMPLATE_TEST_CASE("an arm polled at its due times loses no report", "[hal][arm]", Simulated, Mock) {
+TEMPLATE_TEST_CASE("an arm polled at its due times loses no report", "[hal][arm]", Simulated, Mock, Ur) {
   TestType one, all;
   std::uint64_t polled = 0;
   while (one.arm.next_due() <= at(1)) polled += one.arm.poll(one.arm.next_due()).has_value();
@@ -87,7 +100,7 @@ TEMPLATE_TEST_CASE("an arm polled at its due times loses no report", "[hal][arm]
   CHECK(polled == at_once);
 }
 
-TEMPLATE_TEST_CASE("an arm executes a segment to its end and reports its number", "[hal][arm]", Simulated, Mock) {
+TEMPLATE_TEST_CASE("an arm executes a segment to its end and reports its number", "[hal][arm]", Simulated, Mock, Ur) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   CHECK(latest(arm, at(1)).segment == 0);
@@ -106,7 +119,7 @@ TEMPLATE_TEST_CASE("an arm executes a segment to its end and reports its number"
 }
 
 TEMPLATE_TEST_CASE("an arm refuses without consent, while it moves, after a protective stop, and nonsense",
-                   "[hal][arm]", Simulated, Mock) {
+                   "[hal][arm]", Simulated, Mock, Ur) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   CHECK_FALSE(latest(arm, at(0.05)).program_running);
@@ -127,8 +140,8 @@ TEMPLATE_TEST_CASE("an arm refuses without consent, while it moves, after a prot
   CHECK(arm.counters().segments == 1);
 }
 
-TEMPLATE_TEST_CASE("stop ends the motion short of the target and withdraws the segment", "[hal][arm]", Simulated,
-                   Mock) {
+TEMPLATE_TEST_CASE("stop ends the motion short of the target and withdraws the segment", "[hal][arm]", Simulated, Mock,
+                   Ur) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   static_cast<void>(latest(arm, at(1)));
@@ -144,7 +157,7 @@ TEMPLATE_TEST_CASE("stop ends the motion short of the target and withdraws the s
   CHECK(arm.counters().stops >= 2);
 }
 
-TEMPLATE_TEST_CASE("a pause withdraws the segment, resuming waits for a new one", "[hal][arm]", Simulated, Mock) {
+TEMPLATE_TEST_CASE("a pause withdraws the segment, resuming waits for a new one", "[hal][arm]", Simulated, Mock, Ur) {
   TestType device;
   hal::RobotArm& arm = device.arm;
   static_cast<void>(latest(arm, at(4.5)));

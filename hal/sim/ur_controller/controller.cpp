@@ -143,6 +143,12 @@ void Controller::stop() {
   static_cast<void>(motion_.stop(kProgramStop_rad_s2));
 }
 
+void Controller::place(const JointVector& at_rad) {
+  motion_.place(at_rad);
+  arm_reported_ = false;
+  report_arm();
+}
+
 void Controller::set_speed_slider(double fraction) {
   if (std::isfinite(fraction)) state_.speed_slider = std::clamp(fraction, 0.0, 1.0);
 }

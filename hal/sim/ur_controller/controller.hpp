@@ -48,6 +48,9 @@ class Controller {
   /// The program may take its cycle.
   [[nodiscard]] bool playing() const { return state_.runtime == RuntimeState::kPlaying; }
 
+  /// Puts a standing arm elsewhere.
+  void place(const JointVector& at_rad);
+
   // What programs and clients change.
   [[nodiscard]] ArmMotion& motion() { return motion_; }
   [[nodiscard]] const ArmMotion& motion() const { return motion_; }

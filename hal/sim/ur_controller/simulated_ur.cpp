@@ -1,6 +1,7 @@
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 
 #include "hal/sim/ur_controller/primary_packets.hpp"
+#include "hal/sim/ur_controller/truth_session.hpp"
 #include "platform/core/ensure.hpp"
 
 namespace firstlook::sim::ur {
@@ -23,12 +24,15 @@ std::string_view name_of(Port port) {
       return "secondary, read-only";
     case Port::kRealtimeReadOnly:
       return "realtime, read-only";
+    case Port::kTruth:
+      return "true joints, for simulated cameras";
   }
   return "";
 }
 
 SimulatedUr::SimulatedUr(const ControllerIdentity& identity, const SimulatedUrOptions& options)
     : controller_(identity), programs_(controller_, options.programs) {
+  if (options.start_rad) controller_.place(*options.start_rad);
   if (!options.running) return;
   controller_.release_brakes();
   while (controller_.state().robot_mode != RobotMode::kRunning) controller_.step();
@@ -69,6 +73,9 @@ Session& SimulatedUr::open(Port port) {
       break;
     case Port::kRtde:
       session = std::make_unique<RtdeSession>(controller_, owners_);
+      break;
+    case Port::kTruth:
+      session = std::make_unique<TruthSession>(controller_);
       break;
   }
   ENSURE(5101, session != nullptr);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "hal/sim/ur_controller/dashboard_session.hpp"
@@ -20,7 +21,9 @@ enum class Port : std::uint16_t {
   kPrimaryReadOnly = 30011,
   kSecondaryReadOnly = 30012,
   kRealtimeReadOnly = 30013,
+  kTruth = 30099,  ///< private: truth_session.hpp
 };
+/// What a controller serves.
 inline constexpr std::array kPorts = {
     Port::kDashboard, Port::kPrimary,         Port::kSecondary,         Port::kRealtime,
     Port::kRtde,      Port::kPrimaryReadOnly, Port::kSecondaryReadOnly, Port::kRealtimeReadOnly};
@@ -28,8 +31,9 @@ inline constexpr std::array kPorts = {
 [[nodiscard]] std::string_view name_of(Port port);
 
 struct SimulatedUrOptions {
-  std::vector<StoredProgram> programs;  ///< that `load` finds
-  bool running = false;                 ///< starts with the brakes released instead of without power
+  std::vector<StoredProgram> programs;     ///< that `load` finds
+  bool running = false;                    ///< starts with the brakes released instead of without power
+  std::optional<JointVector> start_rad{};  ///< where the arm stands at first
 };
 
 class SimulatedUr {

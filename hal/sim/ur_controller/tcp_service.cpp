@@ -11,7 +11,8 @@ namespace firstlook::sim::ur {
 namespace {
 
 constexpr std::size_t kUnreadMax = 2 << 20;
-constexpr std::int64_t kLateMax_ns = 500'000'000;  // after a longer sleep the cycles in between are left out
+constexpr std::int64_t kPlayAgain_ns = 3'000'000'000;  // longer than a request for a program lasts
+constexpr std::int64_t kLateMax_ns = 500'000'000;      // after a longer sleep the cycles in between are left out
 
 class TcpService final : public TcpEvents, public script::Sockets {
  public:
@@ -20,12 +21,20 @@ class TcpService final : public TcpEvents, public script::Sockets {
   TcpService(const TcpService&) = delete;
   TcpService& operator=(const TcpService&) = delete;
 
+  [[nodiscard]] Status listen(const TcpServiceOptions& options, Port port) {
+    const int number = static_cast<int>(port) + options.port_offset;
+    const Result<TcpId> listener = tcp_.listen(options.host, static_cast<std::uint16_t>(number));
+    if (!listener) return std::unexpected(listener.error());
+    ports_[*listener] = port;
+    return {};
+  }
+
   [[nodiscard]] Status listen(const TcpServiceOptions& options) {
     for (const Port port : kPorts) {
-      const int number = static_cast<int>(port) + options.port_offset;
-      const Result<TcpId> listener = tcp_.listen(options.host, static_cast<std::uint16_t>(number));
-      if (!listener) return std::unexpected(listener.error());
-      ports_[*listener] = port;
+      if (const Status listening = listen(options, port); !listening) return listening;
+    }
+    if (options.truth) {
+      if (const Status listening = listen(options, Port::kTruth); !listening) return listening;
     }
     for (const auto& [listener, port] : ports_) {
       std::fprintf(stderr, "ur-sim: %s on %s:%d\n", std::string(name_of(port)).c_str(), options.host.c_str(),
@@ -34,13 +43,15 @@ class TcpService final : public TcpEvents, public script::Sockets {
     return {};
   }
 
-  void run() {
+  void run(double play_after_s) {
     std::int64_t due_ns = monotonic_ns() + robot_.cycle().ns;
+    if (play_after_s >= 0) play_at_ns_ = due_ns + static_cast<std::int64_t>(play_after_s * 1e9);
     while (!stop_signal_received() && !finished()) {
       tcp_.poll(due_ns, waiting_, *this);
       const std::int64_t now_ns = monotonic_ns();
       if (now_ns - due_ns > kLateMax_ns) due_ns = now_ns;
       for (; due_ns <= now_ns; due_ns += robot_.cycle().ns) robot_.step();
+      if (now_ns >= play_at_ns_) press_play(now_ns);
       flush();
     }
   }
@@ -141,7 +152,19 @@ class TcpService final : public TcpEvents, public script::Sockets {
     }
   }
 
+  void press_play(std::int64_t now_ns) {
+    constexpr std::string_view kProgram = "external_control.urp";
+    play_at_ns_ = now_ns + kPlayAgain_ns;
+    Programs& programs = robot_.programs();
+    if (robot_.controller().playing()) {
+      play_at_ns_ = INT64_MAX;
+    } else if (programs.loaded_name() == kProgram || programs.load(kProgram)) {
+      static_cast<void>(programs.play());
+    }
+  }
+
   SimulatedUr& robot_;
+  std::int64_t play_at_ns_ = INT64_MAX;
   Tcp tcp_;
   std::map<TcpId, Port> ports_;
   std::map<TcpId, Session*> sessions_;
@@ -158,7 +181,7 @@ Status serve_on_tcp(SimulatedUr& robot, const TcpServiceOptions& options) {
   const ControllerIdentity& identity = robot.controller().identity();
   std::fprintf(stderr, "ur-sim: %s, software %s, ready\n", std::string(identity.nominal.name).c_str(),
                identity.version_text().c_str());
-  service.run();
+  service.run(options.play_after_s);
   return {};
 }
 

@@ -10,6 +10,10 @@ namespace firstlook::sim::ur {
 struct TcpServiceOptions {
   std::string host = "127.0.0.1";
   int port_offset = 0;  ///< added to every port
+  bool truth = false;   ///< the private channel, too
+  /// So long after the start somebody loads external_control.urp and presses Play, again every 3 s until it runs;
+  /// nobody does when negative.
+  double play_after_s = -1;
 };
 
 /// Serves all ports until SIGINT, SIGTERM (see catch_stop_signals) or a client's `shutdown`; says on stderr which ports

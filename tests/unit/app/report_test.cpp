@@ -53,7 +53,7 @@ using Keys = std::vector<std::string>;
 TEST_CASE("result.json keeps its schema", "[report]") {
   const ordered_json json = ordered_json::parse(result_json(sample_record()));
   CHECK(keys_of(json) == Keys{"outcome", "reason", "remedy", "seed", "cell", "phases", "decisions_hash", "hand_eye",
-                              "depth_camera", "time_offset", "mapping", "safety", "memory", "wall", "truth"});
+                              "depth_camera", "time_offset", "mapping", "safety", "robot", "memory", "wall", "truth"});
   CHECK(json["outcome"] == "done");
   CHECK(json["seed"] == 7);
   CHECK(json["phases"].size() == 6);

@@ -1,0 +1,78 @@
+#include "hal/ur/network_robot.hpp"
+
+#include <cmath>
+
+#include "platform/loop/clock.hpp"
+
+namespace firstlook::ur {
+namespace {
+
+constexpr Duration kLook = milliseconds(5);
+constexpr Duration kFirstReport = milliseconds(5000);
+constexpr double kSamePayload_kg = 0.01;  // what the pendant shows
+
+/// An error of what is at this address.
+std::unexpected<Error> at_host(const NetworkRobotOptions& options, const Error& error) {
+  return failure(error.fault, "robot at {}: {}", options.network.host, error.detail());
+}
+
+Result<RobotIdentity> identify(TcpNetwork& network) {
+  RealClock clock;
+  Identification identification(network);
+  while (true) {
+    if (const auto found = identification.poll(clock.now())) return *found;
+    clock.sleep_until(clock.now() + kLook);
+  }
+}
+
+/// The first report of the joints: RTDE works.
+Result<RtdeReport> first_report(TcpNetwork& network) {
+  RealClock clock;
+  RtdeClient rtde(network, UrRobot::kReports_hz);
+  while (clock.now() < Instant{} + kFirstReport) {
+    if (const auto report = rtde.poll(clock.now())) return *report;
+    clock.sleep_until(clock.now() + kLook);
+  }
+  const auto& trouble = rtde.trouble();
+  return failure(Fault::kDeviceMissing, "{}; from 5.10 on the service may have to be switched on in the settings",
+                 trouble ? trouble->detail() : std::string_view("RTDE: nothing came"));
+}
+
+}  // namespace
+
+Status check_payload(const RtdeReport& report, double expected_kg) {
+  if (expected_kg < 0) return {};
+  if (!report.payload_kg) {
+    return failure(
+        Fault::kConfigBadValue,
+        "robot.payload_kg is {}, and this controller (before 3.11 and 5.5.1) does not tell its payload: look "
+        "at the pendant, then set robot.payload_kg to -1",
+        expected_kg);
+  }
+  if (std::abs(*report.payload_kg - expected_kg) <= kSamePayload_kg) return {};
+  return failure(Fault::kConfigBadValue, "robot.payload_kg is {}, the controller has {:.2f} kg set", expected_kg,
+                 *report.payload_kg);
+}
+
+Result<std::unique_ptr<NetworkRobot>> NetworkRobot::connect(const NetworkRobotOptions& options, NoticeSink* notices) {
+  std::unique_ptr<NetworkRobot> made(new NetworkRobot);
+  TcpNetwork& network = made->network_;
+  if (const Status opened = network.open(options.network); !opened) return std::unexpected(opened.error());
+  UrRobotOptions robot{options.arm, options.own_address, options.network.control_port};
+  if (options.own_address == "auto") {
+    const auto own = network.own_address();
+    if (!own) return at_host(options, own.error());
+    robot.own_host = *own;
+  }
+  const auto identity = identify(network);
+  if (!identity) return at_host(options, identity.error());
+  made->identity_ = *identity;
+  if (const Status fit = check_robot(*identity, {options.arm}); !fit) return at_host(options, fit.error());
+  const auto report = first_report(network);
+  if (!report) return at_host(options, report.error());
+  if (const Status fit = check_payload(*report, options.payload_kg); !fit) return at_host(options, fit.error());
+  made->robot_ = std::make_unique<UrRobot>(network, robot, notices);
+  return made;
+}
+
+}  // namespace firstlook::ur

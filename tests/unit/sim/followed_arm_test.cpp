@@ -1,0 +1,109 @@
+/// The private channel of a simulated robot, and the true body that follows it.
+#include "hal/sim/followed_arm.hpp"
+
+#include <catch2/catch.hpp>
+#include <thread>
+
+#include "hal/sim/ur_controller/simulated_ur.hpp"
+#include "hal/sim/ur_controller/truth_reader.hpp"
+
+namespace firstlook::sim {
+namespace {
+
+/// Sends what it was given to whoever connects, and keeps what comes back.
+class Server {
+ public:
+  Server() { REQUIRE(listener_.listen(0)); }
+  ~Server() {
+    if (thread_.joinable()) thread_.join();
+  }
+  [[nodiscard]] std::uint16_t port() const { return listener_.port(); }
+  void send(std::string bytes) {
+    thread_ = std::thread([this, bytes = std::move(bytes)] {
+      for (int i = 0; i < 4000 && stream_.state() != TcpStream::State::kOpen; ++i) {
+        stream_ = listener_.accept();
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+      stream_.send(bytes);
+    });
+  }
+  std::string heard() {
+    thread_.join();
+    std::array<char, 16> room;
+    for (int i = 0; i < 4000; ++i) {
+      const std::string_view came = stream_.receive(room);
+      if (!came.empty()) return std::string(came);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return {};
+  }
+
+ private:
+  TcpListener listener_;
+  TcpStream stream_;
+  std::thread thread_;
+};
+
+struct Wall final : BodyWatcher {
+  bool body_moved(Instant, const JointVector&, const JointVector& to_rad) override {
+    ++calls;
+    return to_rad[0] > 0.3;
+  }
+  void body_led() override {}
+  int calls = 0;
+};
+
+}  // namespace
+
+TEST_CASE("cameras follow the true joints and kinematics of a robot in another process", "[sim]") {
+  ur::SimulatedUrOptions options;
+  options.running = true;
+  options.start_rad = JointVector{0.1, -1.2, 1.3, -1.4, 1.5, 0.6};
+  ur::SimulatedUr robot(*ur::identify_controller("ur5e", 3, ""), options);
+  ur::Session& session = robot.open(ur::Port::kTruth);
+  JointVector target_rad = *options.start_rad;
+  target_rad[0] += 0.4;
+  robot.controller().motion().movej(target_rad, 1.0, 1.4, 0);
+  for (int i = 0; i < 1000; ++i) robot.step();
+  Server server;
+  server.send(session.output());
+  ur::TruthReader reader;
+  REQUIRE(reader.connect("127.0.0.1", server.port()));
+
+  const ArmModel& truth = robot.controller().identity().arm;
+  ArmModel model = *find_arm_model("ur5e");
+  CHECK(std::abs(reader.true_dh()[1].a_m - model.dh[1].a_m) > 1e-6);
+  model.dh = reader.true_dh();
+  Wall wall;
+  FollowedArm arm(reader, model, 1, {0, 0}, &wall);
+  for (int i = 0; i < 200 && arm.known_until() < Instant{1}; ++i) {
+    arm.advance(Instant{seconds(0.01 * i).ns});
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  const Instant end = arm.known_until();
+  CHECK((arm.true_joints(end) - target_rad).max_abs() < 1e-9);
+  CHECK(wall.calls > 200);
+  const auto flange = arm.true_flange(target_rad).pose();
+  CHECK((flange.matrix() - forward(truth, target_rad).flange().pose().matrix()).norm() < 1e-12);
+  CHECK(server.heard() == "T");  // it touched once, and said so once
+}
+
+TEST_CASE("a touch that is felt stops the robot protectively", "[sim]") {
+  ur::SimulatedUrOptions options;
+  options.running = true;
+  ur::SimulatedUr robot(*ur::identify_controller("ur5", 0, ""), options);
+  ur::Session& session = robot.open(ur::Port::kTruth);
+  session.receive("T");
+  CHECK(robot.controller().state().safety_mode == ur::SafetyMode::kProtectiveStop);
+}
+
+TEST_CASE("who is no such channel is refused", "[sim]") {
+  Server server;
+  server.send(std::string(400, 'x'));
+  ur::TruthReader reader;
+  const Status status = reader.connect("127.0.0.1", server.port());
+  REQUIRE_FALSE(status);
+  CHECK(status.error().fault == Fault::kDeviceMissing);
+}
+
+}  // namespace firstlook::sim
