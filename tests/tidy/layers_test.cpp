@@ -19,6 +19,7 @@ const std::vector<Rule> kRules = {
     {"platform/", {"platform/"}},
     {"algorithms/", {"algorithms/", "platform/core/"}},
     {"hal/api/", {"hal/api/", "platform/"}},
+    {"hal/can/", {"hal/can/", "hal/api/", "platform/"}},
     {"hal/ur/", {"hal/ur/", "hal/api/", "platform/"}},
     {"hal/sim/", {"hal/sim/", "hal/api/", "platform/", "algorithms/"}},
     {"app/main.cpp", {"app/", "hal/", "platform/", "algorithms/"}},
