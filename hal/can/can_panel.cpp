@@ -100,8 +100,6 @@ std::optional<hal::OperatorEvent> CanPanel::poll(Instant now) {
   }
   if (io_.take_loss()) {
     enabling_ = false;
-    start_.start(true);  // pressed only after a release that we see
-    confirm_.start(true);
     press(now, hal::OperatorAction::kStop);
   }
   if (io_.operational()) settle_buttons(now);
