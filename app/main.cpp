@@ -10,9 +10,12 @@
 #include <string>
 #include <system_error>
 
+#include "app/check/check_report.hpp"
+#include "app/check/device_check.hpp"
 #include "app/cli/cli.hpp"
 #include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
+#include "app/real_devices.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"
 #include "app/shell/calibration_recording.hpp"
@@ -242,6 +245,11 @@ Result<std::optional<StoredCalibration>> stored_calibration(RunScope scope, cons
   return std::optional(*read);
 }
 
+/// The boards that the configuration names; load_config has refused what is no board.
+std::vector<NamedTarget> boards_of(const Config& config) {
+  return names_boards(config) ? targets_of(config).value() : std::vector<NamedTarget>();
+}
+
 int run_job(const RunCommand& command) {
   auto loaded = load_config(command.sources);
   if (!loaded) return fail(loaded.error());
@@ -258,10 +266,8 @@ int run_job(const RunCommand& command) {
       command.out.empty() ? fmt::format("runs/{}-{}", utc_date_for_name(), config.seed) : command.out;
   if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
 
-  std::vector<NamedTarget> boards;  // load_config has refused what is no board
-  if (names_boards(config)) boards = targets_of(config).value();
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, boards, config.depth.sensor});
+                                        command.faults, config.workers, boards_of(config), config.depth.sensor});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);
@@ -307,6 +313,43 @@ int run_job(const RunCommand& command) {
   narrator.line(fmt::format("report    {}/report.html", folder));
   if (command.json) std::printf("%s", result_json(record).c_str());
   return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());
+}
+
+/// Asks the devices that the configuration names, and those of the simulated cell in place of the others.
+int run_check(const CheckCommand& command) {
+  auto loaded = load_config(command.sources);
+  if (!loaded) return fail(loaded.error());
+  Config config = loaded->config;
+  auto checks = real_device_checks(config);
+  if (!checks) return fail(checks.error());
+  const bool simulated = checks->empty();
+  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), true, "", config.workers,
+                                        boards_of(config), config.depth.sensor});
+  if (!cell) return fail(cell.error());
+  sim::SimulatedCell& world = **cell;
+  if (simulated) describe_cell(world.description(), config);
+  const auto stand_in = [&](std::string_view role, std::unique_ptr<WatchedDevice> device) {
+    if (std::ranges::find(*checks, role, &DeviceCheck::role) != checks->end()) return;
+    checks->push_back({std::string(role), true, std::move(device)});
+  };
+  stand_in(kArmRole, watch_arm(world.arm(), nullptr));
+  stand_in(kColorRole, watch_stream(world.color(), nullptr));
+  stand_in(kDepthRole, watch_stream(world.depth(), nullptr));
+  stand_in(kPendantRole, watch_pendant(world.pendant(), nullptr));
+  stand_in(kPanelRole, watch_panel(world.panel(), nullptr));
+  std::unique_ptr<Clock> clock;
+  if (simulated) {
+    clock = std::make_unique<VirtualClock>();
+  } else {
+    clock = std::make_unique<RealClock>();
+  }
+  Narrator narrator;
+  narrator.line(fmt::format(simulated ? "no device is configured: those of the simulated cell {}"
+                                      : "what is not configured is of the simulated cell {}",
+                            config.cell));
+  CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};
+  std::fputs((command.json ? check_json(result) : check_text(result)).c_str(), stdout);
+  return result.all_ready() ? kDone : kDevice;
 }
 
 /// The faults are the simulated cell's: what it would refuse in every cell is refused once, before the first.
@@ -371,6 +414,8 @@ struct Dispatch {
   int operator()(const BoardCommandOptions& c) const { return run_board_command(c); }
   int operator()(const CampaignCommandOptions& c) const { return run_campaign_of(c); }
   int operator()(const UrSimCommand& c) const { return run_ur_sim(c); }
+  int operator()(const CheckCommand& c) const { return run_check(c); }
+  int operator()(const BundleCommandOptions& c) const { return run_bundle_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

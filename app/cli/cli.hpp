@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/cli/board_command.hpp"
+#include "app/cli/bundle_command.hpp"
 #include "app/cli/calibrate_command.hpp"
 #include "app/cli/campaign_command.hpp"
 #include "app/cli/export_command.hpp"
@@ -29,6 +30,10 @@ struct RunCommand {
   std::string out;  ///< empty: runs/<date>-<seed>
   std::string faults;
 };
+struct CheckCommand {
+  ConfigSources sources;
+  bool json = false;
+};
 struct ReplayCommand {
   std::string journal;
 };
@@ -49,7 +54,7 @@ struct UrSimCommand {
 
 using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,
                              BoardCommandOptions, CampaignCommandOptions, ReplayCommand, StatesCommand, ExplainCommand,
-                             ConfigCommandOptions, UrSimCommand>;
+                             ConfigCommandOptions, UrSimCommand, CheckCommand, BundleCommandOptions>;
 
 /// Either a command, or the exit code after help, version or an error of usage were printed.
 struct ParsedCommandLine {

@@ -7,8 +7,8 @@
 
 #include "hal/api/cameras.hpp"
 #include "hal/api/device_report.hpp"
+#include "hal/api/frame_slots.hpp"
 #include "hal/v4l2/capture.hpp"
-#include "hal/v4l2/frame_slots.hpp"
 
 namespace firstlook::v4l2 {
 
@@ -76,7 +76,7 @@ class V4l2Camera final : public hal::ColorCamera, public hal::ReportingDevice {
   PictureLayout layout_;  ///< of the slots: as granted at the first opening, without padding
   bool layout_known_ = false;
   bool layout_changed_ = false;
-  FrameSlots slots_;
+  hal::FrameSlots slots_;
   hal::StreamCounters stream_;
   V4l2Counters counters_;
   bool worked_ = false;

@@ -1,4 +1,4 @@
-/// The last frames of a camera, copied by the loop thread and read by jobs.
+/// The last frames of a camera, copied by its driver and read by jobs.
 #pragma once
 
 #include <array>
@@ -9,10 +9,10 @@
 #include "hal/api/cameras.hpp"
 #include "platform/memory/pool_buffer.hpp"
 
-namespace firstlook::v4l2 {
+namespace firstlook::hal {
 
-/// 32 slots of fixed size. store() from the loop thread, which never waits: a slot that a job reads just then is not
-/// overwritten. with() from any thread.
+/// 32 slots of fixed size, for drivers. store() from one thread, which never waits: a slot that a job reads just then
+/// is not overwritten. with() from any thread.
 class FrameSlots {
  public:
   static constexpr std::uint32_t kSlots = 32;
@@ -29,7 +29,7 @@ class FrameSlots {
   /// Has `copy` write `size` bytes into the oldest slot. False when they do not fit, or a job is still reading that
   /// frame; then nothing is kept.
   template <typename Copy>
-  [[nodiscard]] bool store(std::size_t size, hal::Frame& frame, Copy copy) {
+  [[nodiscard]] bool store(std::size_t size, Frame& frame, Copy copy) {
     if (size > bytes_each_) return false;
     const std::uint32_t n = next_ % kSlots;
     Slot& slot = slots_[n];
@@ -46,7 +46,7 @@ class FrameSlots {
 
   /// Calls `read` with the bytes of a frame. Error: kFrameGone; what `read` returns.
   template <typename Read>
-  [[nodiscard]] Status with(const hal::Frame& frame, Read read) const {
+  [[nodiscard]] Status with(const Frame& frame, Read read) const {
     if (frame.slot >= kSlots) return failure(Fault::kFrameGone, "frame {}", frame.sequence);
     const Slot& slot = slots_[frame.slot];
     const std::scoped_lock lock(slot.mutex);
@@ -67,4 +67,4 @@ class FrameSlots {
   std::uint32_t next_ = 0;
 };
 
-}  // namespace firstlook::v4l2
+}  // namespace firstlook::hal
