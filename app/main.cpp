@@ -260,6 +260,9 @@ int run_job(const RunCommand& command) {
   } else {
     narrator.line(fmt::format("running in the simulated cell {}", config.cell));
   }
+  if (names_real_devices(config)) {
+    narrator.line("warning   the devices that the configuration names are asked by `firstlook check` only, so far");
+  }
   const auto stored = stored_calibration(command.scope, config);
   if (!stored) return fail(stored.error());
   const std::string folder =
@@ -337,6 +340,8 @@ int run_check(const CheckCommand& command) {
   stand_in(kDepthRole, watch_stream(world.depth(), nullptr));
   stand_in(kPendantRole, watch_pendant(world.pendant(), nullptr));
   stand_in(kPanelRole, watch_panel(world.panel(), nullptr));
+  constexpr std::string_view kOrder[] = {kArmRole, kColorRole, kDepthRole, kPendantRole, kPanelRole};
+  std::ranges::sort(*checks, {}, [&](const DeviceCheck& check) { return std::ranges::find(kOrder, check.role); });
   std::unique_ptr<Clock> clock;
   if (simulated) {
     clock = std::make_unique<VirtualClock>();
@@ -344,9 +349,8 @@ int run_check(const CheckCommand& command) {
     clock = std::make_unique<RealClock>();
   }
   Narrator narrator;
-  narrator.line(fmt::format(simulated ? "no device is configured: those of the simulated cell {}"
-                                      : "what is not configured is of the simulated cell {}",
-                            config.cell));
+  narrator.line(simulated ? fmt::format("no device is configured: those of the simulated cell {}", config.cell)
+                          : fmt::format("what is not configured is of the simulated cell {}", config.cell));
   CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};
   std::fputs((command.json ? check_json(result) : check_text(result)).c_str(), stdout);
   return result.all_ready() ? kDone : kDevice;

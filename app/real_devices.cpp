@@ -5,8 +5,9 @@
 
 #include "app/dataset/calibration_dataset.hpp"
 #include "hal/can/can_panel.hpp"
+#include "hal/freenect/kinect.hpp"
 #include "hal/openni/openni_depth.hpp"
-#include "hal/v4l2/v4l2_camera.hpp"
+#include "hal/v4l2/threaded_camera.hpp"
 #include "platform/linux/system_calls.hpp"
 
 namespace firstlook {
@@ -17,13 +18,13 @@ template <typename Device>
 class OwnedDevice final : public WatchedDevice {
  public:
   template <typename Watch>
-  OwnedDevice(std::unique_ptr<Device> device, Watch watch) : device_(std::move(device)), watch_(watch(*device_)) {}
+  OwnedDevice(std::shared_ptr<Device> device, Watch watch) : device_(std::move(device)), watch_(watch(*device_)) {}
   void poll(Instant now) override { watch_->poll(now); }
   [[nodiscard]] Instant next_due() const override { return watch_->next_due(); }
   [[nodiscard]] hal::DeviceReport report(Instant now) const override { return watch_->report(now); }
 
  private:
-  std::unique_ptr<Device> device_;
+  std::shared_ptr<Device> device_;  ///< a Kinect has two cameras
   std::unique_ptr<WatchedDevice> watch_;
 };
 
@@ -57,7 +58,7 @@ Result<CameraIntrinsics> intrinsics_of(const std::string& file, int width, int h
   if (file == "none") return CameraIntrinsics{width, height};
   const Result<CameraIntrinsics> read = read_camera_info(file);
   if (read && (read->width != width || read->height != height)) {
-    return failure(Fault::kConfigBadValue, "{} is of {} x {} pixels, camera.width and camera.height say {} x {}", file,
+    return failure(Fault::kConfigBadValue, "{} is of {} x {} pixels, the camera's pictures are {} x {}", file,
                    read->width, read->height, width, height);
   }
   return read;
@@ -98,16 +99,69 @@ Result<openni::OpenNiDepthOptions> depth_options(const Config::Depth& d) {
 
 }  // namespace
 
+namespace {
+
+constexpr std::string_view kKinect = "freenect";
+
+/// "freenect" or "freenect:SERIAL".
+bool is_kinect(std::string_view device) { return device == kKinect || device.starts_with("freenect:"); }
+
+/// The Kinect behind one camera or both.
+Status add_kinect(const Config& config, std::vector<DeviceCheck>& checks) {
+  freenect::KinectOptions options;
+  options.usb.depth = is_kinect(config.depth.device);
+  options.usb.color = is_kinect(config.camera.device);
+  for (const std::string& name : {config.depth.device, config.camera.device}) {
+    if (is_kinect(name) && name.size() > kKinect.size()) options.usb.serial = name.substr(kKinect.size() + 1);
+  }
+  if (config.depth.info != "none" && options.usb.depth) {
+    const auto read = intrinsics_of(config.depth.info, freenect::kWidth, freenect::kHeight);
+    if (!read) return std::unexpected(read.error());
+    options.depth_intrinsics = *read;
+  }
+  if (config.camera.info != "none" && options.usb.color) {
+    const auto read = intrinsics_of(config.camera.info, freenect::kWidth, freenect::kHeight);
+    if (!read) return std::unexpected(read.error());
+    options.color_intrinsics = *read;
+  }
+  auto made = freenect::Kinect::make(kernel(), options);
+  if (!made) {
+    if (options.usb.color) checks.push_back({std::string(kColorRole), false, absent_device(kKinect, made.error())});
+    if (options.usb.depth) checks.push_back({std::string(kDepthRole), false, absent_device(kKinect, made.error())});
+    return {};
+  }
+  const std::shared_ptr<freenect::Kinect> kinect = std::move(*made);
+  using Owned = OwnedDevice<freenect::Kinect>;
+  if (options.usb.color) {
+    const auto watch = [](freenect::Kinect& k) { return watch_stream(k.color(), &k.color_report()); };
+    checks.push_back({std::string(kColorRole), false, std::make_unique<Owned>(kinect, watch)});
+  }
+  if (options.usb.depth) {
+    const auto watch = [](freenect::Kinect& k) { return watch_stream(k.depth(), &k.depth_report()); };
+    checks.push_back({std::string(kDepthRole), false, std::make_unique<Owned>(kinect, watch)});
+  }
+  return {};
+}
+
+}  // namespace
+
+bool names_real_devices(const Config& config) {
+  return config.camera.device != "none" || config.depth.device != "none" || config.panel.can_interface != "none";
+}
+
 Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {
   std::vector<DeviceCheck> checks;
-  if (config.camera.device != "none") {
+  if (is_kinect(config.camera.device) || is_kinect(config.depth.device)) {
+    if (const Status status = add_kinect(config, checks); !status) return std::unexpected(status.error());
+  }
+  if (config.camera.device != "none" && !is_kinect(config.camera.device)) {
     const auto intrinsics = intrinsics_of(config.camera.info, config.camera.width, config.camera.height);
     if (!intrinsics) return std::unexpected(intrinsics.error());
     checks.push_back(check_of(kColorRole, config.camera.device,
-                              v4l2::V4l2Camera::make(kernel(), camera_options(config.camera, *intrinsics)),
-                              [](v4l2::V4l2Camera& camera) { return watch_stream(camera, &camera); }));
+                              v4l2::ThreadedCamera::make(kernel(), camera_options(config.camera, *intrinsics)),
+                              [](v4l2::ThreadedCamera& camera) { return watch_stream(camera, &camera); }));
   }
-  if (config.depth.device != "none") {
+  if (config.depth.device != "none" && !is_kinect(config.depth.device)) {
     const auto options = depth_options(config.depth);
     if (!options) return std::unexpected(options.error());
     checks.push_back(check_of(kDepthRole, config.depth.device, openni::OpenNiDepth::make(kernel(), *options),

@@ -17,6 +17,9 @@ inline constexpr std::string_view kDepthRole = "depth camera";
 inline constexpr std::string_view kPendantRole = "pendant";
 inline constexpr std::string_view kPanelRole = "panel";
 
+/// Whether the configuration names any.
+[[nodiscard]] bool names_real_devices(const Config& config);
+
 /// A check of each device that the configuration names; one that cannot even be made says why. Errors: those of a
 /// camera_info.yaml that is named: kDataMissing, kDataMalformed, kConfigBadValue for one of another size.
 [[nodiscard]] Result<std::vector<DeviceCheck>> real_device_checks(const Config& config);

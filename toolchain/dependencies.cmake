@@ -27,3 +27,7 @@ firstlook_system(firstlook_embree INCLUDES ${EMBREE_INCLUDE_DIRS} LIBRARIES embr
 find_path(OPENNI2_INCLUDE_DIR OpenNI.h PATH_SUFFIXES openni2 REQUIRED)
 find_library(OPENNI2_LIBRARY OpenNI2 REQUIRED)
 firstlook_system(firstlook_openni INCLUDES ${OPENNI2_INCLUDE_DIR} LIBRARIES ${OPENNI2_LIBRARY})
+find_path(FREENECT_INCLUDE_DIR libfreenect.h REQUIRED)
+find_library(FREENECT_LIBRARY freenect REQUIRED)
+firstlook_system(firstlook_freenect_headers INCLUDES ${FREENECT_INCLUDE_DIR})
+firstlook_system(firstlook_freenect INCLUDES ${FREENECT_INCLUDE_DIR} LIBRARIES ${FREENECT_LIBRARY})

@@ -9,7 +9,7 @@ using hal::DeviceReport;
 using hal::DeviceState;
 
 constexpr double kWatched_s = 1;
-constexpr double kPatience_s = 10;
+constexpr double kPatience_s = 6;  // two resets of a panel, or the opening of a USB camera
 constexpr Duration kLeastStep = milliseconds(1);
 
 /// The device's own report, or a blank one that counts as ready until something else is seen.

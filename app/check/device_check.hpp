@@ -52,7 +52,7 @@ struct CheckResult {
   [[nodiscard]] bool all_ready() const;
 };
 
-/// Polls all of them at their pace until each is ready and was watched for a second, or for ten seconds at most: what
+/// Polls all of them at their pace until each is ready and was watched for a second, or for six seconds at most: what
 /// is missing may still be starting.
 [[nodiscard]] std::vector<CheckedDevice> watch_devices(std::span<const DeviceCheck> checks, Clock& clock);
 

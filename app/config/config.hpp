@@ -113,7 +113,7 @@ struct Config {
   } calibration;
 
   struct Camera {
-    std::string device = "none";  ///< V4L2: /dev/v4l/by-id/...; none: the simulated cell's camera
+    std::string device = "none";  ///< /dev/v4l/by-id/... | freenect | none: the simulated cell's camera
     int width = 640, height = 480;
     std::string format = "auto";  ///< auto | YUYV | NV12 | GREY | MJPG
     double rate_hz = 30;
@@ -153,7 +153,7 @@ struct Config {
     double crop_m = 0;               ///< returns beyond it are left out; 0: none is
     double filter_voxel_m = 0;       ///< of returns in one cube of this edge one is kept; 0: all are
     int plane_fit_px = 0;            ///< window of the plane fit before insertion; 0: there is none
-    std::string device = "none";     ///< openni | a URI of OpenNI | FILE.oni | none: the simulated cell's camera
+    std::string device = "none";     ///< openni | its URI | FILE.oni | freenect[:SERIAL] | none: the simulated cell's
     std::string info = "none";       ///< camera_info.yaml; none: by the device's field of view
     /// Standard deviation of a depth.
     [[nodiscard]] double sigma_m(double z_m) const { return std::hypot(noise_floor_m, noise_at_1m_m * z_m * z_m); }

@@ -259,8 +259,8 @@ void add_depth_keys(Keys& keys, Config& c) {
        0,
        0,
        {},
-       "depth camera through OpenNI: openni for the first one found, its URI, or a recording FILE.oni; none: "
-       "the simulated cell's"});
+       "depth camera. openni: the first one that OpenNI finds, or its URI, or a recording FILE.oni; freenect, or "
+       "freenect:SERIAL: a Kinect v1; none: the simulated cell's"});
   keys.push_back({"depth.info",
                   &c.depth.info,
                   0,

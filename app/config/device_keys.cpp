@@ -14,12 +14,14 @@ constexpr double kLastInput = 31;
 
 std::vector<ConfigKey> camera_keys(Config::Camera& k) {
   std::vector<ConfigKey> keys;
-  keys.push_back({"camera.device",
-                  &k.device,
-                  0,
-                  0,
-                  {},
-                  "colour camera on V4L2 by its stable path, /dev/v4l/by-id/...; none: the simulated cell's"});
+  keys.push_back(
+      {"camera.device",
+       &k.device,
+       0,
+       0,
+       {},
+       "colour camera on V4L2 by its stable path, /dev/v4l/by-id/...; freenect: that of a Kinect v1, in grey "
+       "values; none: the simulated cell's"});
   keys.push_back({"camera.width", &k.width, 160, 4096, {}, "of its pictures; intrinsics hold for one size only"});
   keys.push_back({"camera.height", &k.height, 120, 4096, {}, "of its pictures"});
   keys.push_back(

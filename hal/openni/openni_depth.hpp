@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "hal/api/cameras.hpp"
+#include "hal/api/device_clock.hpp"
 #include "hal/api/device_report.hpp"
 #include "hal/api/frame_slots.hpp"
-#include "hal/openni/device_clock.hpp"
 #include "hal/openni/sensor.hpp"
 #include "platform/linux/system_calls.hpp"
 #include "platform/linux/thread.hpp"
@@ -79,7 +79,7 @@ class OpenNiDepth final : public hal::DepthCamera, public hal::ReportingDevice {
   hal::FrameSlots slots_;
 
   // The thread's.
-  DeviceClock clock_;
+  hal::DeviceClock clock_;
   std::optional<std::uint32_t> index_;
   std::uint32_t sequence_ = 0;
 

@@ -71,7 +71,7 @@ void V4l2Camera::open(Instant now) {
     return;
   }
   layout_changed_ = false;
-  layout_ = granted;
+  if (!layout_known_) layout_ = granted;  // not again: jobs may be reading
   layout_known_ = true;
   driver_sequence_.reset();
   input_errors_in_a_row_ = 0;

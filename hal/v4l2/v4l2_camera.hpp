@@ -37,8 +37,8 @@ struct V4l2Counters {
 
 /// poll, next_due, counters and report from the loop thread; read and read_color from any.
 /// A frame is copied once, as the driver gave it; pixels are made by who reads them. poll() does not block while the
-/// camera streams; opening it, at first and after a loss, asks the camera and can take up to a second with USB. A job
-/// has stopped by then: a stale stream stops it.
+/// camera streams; opening it, at first and after a loss, asks the camera and can take up to a second with USB:
+/// ThreadedCamera keeps that away from the loop.
 class V4l2Camera final : public hal::ColorCamera, public hal::ReportingDevice {
  public:
   /// Takes the memory; the device is opened by the first poll. Error: kOutOfMemory when 32 frames of this size do not

@@ -113,7 +113,8 @@ void SimulatedIoNode::answer_sdo(const can_frame& frame) {
       reply(0x41, 24);
       return;
     }
-    const std::uint64_t value = address == Address{0x6000, 1} ? inputs_ & 0xFF : entry.value;
+    const bool inputs = index == 0x6000 && sub > 0;
+    const std::uint64_t value = inputs ? inputs_ >> (8 * (sub - 1)) & 0xFF : entry.value;
     reply(0x43U | (4 - entry.bytes) << 2U, value);
     return;
   }
@@ -170,8 +171,8 @@ void SimulatedIoNode::receive(const can_frame& frame, Instant now) {
   } else if (id == 0x600 + number_ && frame.len == 8 && state_ != kStopped) {
     answer_sdo(frame);
   } else if (state_ == kOperational && id == (entries_.at({0x1400, 1}).value & 0xBFFFFFFF) && frame.len >= 1) {
-    entries_.at({0x6200, 1}).value = frame.data[0];
-    lamps_ = frame.data[0];
+    lamps_ = 0;
+    for (unsigned i = 0; i < frame.len && i < 4; ++i) lamps_ |= static_cast<unsigned>(frame.data[i]) << (8 * i);
   } else if (entries_.contains({0x1016, 1}) && id == 0x700 + (entries_.at({0x1016, 1}).value >> 16 & 0x7F) &&
              frame.len == 1) {
     master_heard_ = now;
@@ -185,17 +186,24 @@ void SimulatedIoNode::watch_master(Instant now) {
   misses_master_ = true;
   master_heard_.reset();
   if (state_ == kOperational) state_ = kPreOperational;
-  lamps_ = static_cast<unsigned>(entries_.at({0x6207, 1}).value & entries_.at({0x6206, 1}).value);
+  lamps_ = 0;
+  for (unsigned i = 0; entries_.contains({0x6207, i + 1}); ++i) {
+    const std::uint64_t shown = entries_.at({0x6207, i + 1}).value & entries_.at({0x6206, i + 1}).value;
+    lamps_ |= static_cast<unsigned>(shown) << (8 * i);
+  }
 }
 
 void SimulatedIoNode::send_inputs(Instant now) {
   const std::uint64_t id = entries_.at({0x1800, 1}).value;
-  if ((id & 0x80000000) != 0 || entries_.at({0x1A00, 0}).value != 1) return;
+  const std::uint64_t count = entries_.at({0x1A00, 0}).value;
+  if ((id & 0x80000000) != 0 || count == 0) return;
   const auto every = milliseconds(static_cast<std::int64_t>(entries_.at({0x1800, 5}).value));
   if (sent_inputs_ == inputs_ && (every.ns == 0 || now < next_inputs_)) return;
   sent_inputs_ = inputs_;
   next_inputs_ = now + every;
-  say(static_cast<unsigned>(id & 0x7FF), {inputs_ & 0xFF});
+  std::vector<unsigned> bytes;
+  for (unsigned i = 0; i < count; ++i) bytes.push_back(inputs_ >> (8 * i) & 0xFF);
+  say(static_cast<unsigned>(id & 0x7FF), bytes);
 }
 
 std::vector<can_frame> SimulatedIoNode::turn(Instant now) {

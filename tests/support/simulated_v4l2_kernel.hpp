@@ -5,16 +5,19 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <deque>
 #include <functional>
 #include <map>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "platform/core/time.hpp"
 #include "platform/linux/system_calls.hpp"
+#include "platform/linux/wakeup.hpp"
 
 namespace firstlook::test {
 
@@ -46,6 +49,9 @@ class SimulatedV4l2Kernel final : public SystemCalls {
   int input_errors = 0;                 ///< so many DQBUF give EIO
   std::map<unsigned long, int> refuse;  ///< an errno for each request
   int open_error = 0;
+  // With an own thread above it: the computer's time in place of set_now(), and an opening that takes its time.
+  bool real_time = false;
+  Duration open_takes{};
 
   void set_now(Instant now) { now_ = now; }
   void unplug() {
@@ -61,6 +67,7 @@ class SimulatedV4l2Kernel final : public SystemCalls {
   int open(const char* asked, int) override {
     if (!present || path != asked) return -ENOENT;
     if (open_error != 0) return -open_error;
+    if (open_takes.ns > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(open_takes.ns));
     open_ = true;
     gone_ = false;
     ++opens_;
@@ -77,7 +84,7 @@ class SimulatedV4l2Kernel final : public SystemCalls {
   int poll(pollfd*, std::size_t, int) override { return 0; }
   std::ptrdiff_t read(int, void*, std::size_t) override { return -EINVAL; }
   std::ptrdiff_t write(int, const void*, std::size_t) override { return -EINVAL; }
-  std::int64_t monotonic_ns() override { return kBoot_ns + now_.ns; }
+  std::int64_t monotonic_ns() override { return real_time ? firstlook::monotonic_ns() : kBoot_ns + now_.ns; }
   int mmap(std::size_t size, int, std::int64_t offset, void** mapped) override {
     auto& buffer = memory_.at(static_cast<std::size_t>(offset / kPage));
     if (size != buffer.size()) return -EINVAL;
@@ -92,6 +99,7 @@ class SimulatedV4l2Kernel final : public SystemCalls {
 
   int ioctl(int, unsigned long request, void* argument) override {
     if (!open_) return -EBADF;
+    if (real_time) now_ = {firstlook::monotonic_ns() - kBoot_ns};
     if (!present) return -ENODEV;
     if (const auto refused = refuse.find(request); refused != refuse.end()) return -refused->second;
     switch (request) {

@@ -21,6 +21,7 @@ const std::vector<Rule> kRules = {
     {"hal/api/", {"hal/api/", "platform/"}},
     {"hal/can/", {"hal/can/", "hal/api/", "platform/"}},
     {"hal/ur/", {"hal/ur/", "hal/api/", "platform/"}},
+    {"hal/freenect/", {"hal/freenect/", "hal/api/", "platform/"}},
     {"hal/openni/", {"hal/openni/", "hal/api/", "platform/"}},
     {"hal/v4l2/", {"hal/v4l2/", "hal/api/", "platform/"}},
     {"hal/sim/", {"hal/sim/", "hal/api/", "platform/", "algorithms/"}},

@@ -80,7 +80,7 @@ TEST_CASE("a stream without frames, and an arm without reports or in a stop, are
     CHECK(result.devices[0].report.state == DeviceState::kMissing);
     CHECK(result.devices[0].report.detail.view() == "no frame came");
     CHECK_FALSE(result.all_ready());
-    CHECK(clock.now().seconds() >= 10);  // it may have been starting
+    CHECK(clock.now().seconds() >= 6);  // it may have been starting
   }
   SECTION("arm") {
     mock::MockRobotArm arm(JointVector{0, -1.5, 1, 0, 0, 0});

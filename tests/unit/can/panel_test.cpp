@@ -30,8 +30,8 @@ constexpr unsigned kRed = 1, kAmber = 2, kGreen = 4, kBuzzer = 8;
 
 /// Panel, bus and module; time passes in steps of a millisecond, the panel is asked when it is due.
 struct Rig {
-  explicit Rig(CanPanelOptions panel_options = {}, unsigned number = 10)
-      : node(sheet(), number), options(panel_options), panel(kernel, options) {
+  explicit Rig(CanPanelOptions panel_options = {}, unsigned number = 10, const std::string& eds = sheet())
+      : node(eds, number), options(panel_options), panel(kernel, options) {
     kernel.attach(node);
     node.set_inputs(kRested);
     node.power(true);
@@ -475,7 +475,36 @@ TEST_CASE("a full queue delays a lamp and loses nothing", "[can][panel]") {
   CHECK(rig.number("sends_put_off") > 0);
 }
 
-TEST_CASE("other wiring: sixteen inputs, a stop that closes, lamps elsewhere", "[can][panel]") {
+TEST_CASE("a module with sixteen inputs and outputs", "[can][panel]") {
+  std::string eds = sheet();
+  const auto add = [&](const char* entry, const char* type, const char* access, const char* value) {
+    eds += fmt::format("\n[{}]\nObjectType=0x7\nDataType={}\nAccessType={}\nDefaultValue={}\n", entry, type, access,
+                       value);
+  };
+  add("6000sub2", "0x0005", "ro", "0");
+  add("6200sub2", "0x0005", "rww", "0");
+  add("6206sub2", "0x0005", "rw", "0xFF");
+  add("6207sub2", "0x0005", "rw", "0");
+  add("1600sub2", "0x0007", "rw", "0");
+  add("1A00sub2", "0x0007", "rw", "0");
+  CanPanelOptions options;
+  options.io.input_bytes = options.io.output_bytes = 2;
+  options.wiring = {9, 1, 15, -1, true, 8, 0, 15, -1};
+  Rig rig(options, 10, eds);
+  rig.panel.light(hal::Light::kGreen);
+  rig.run(1);
+  CHECK(rig.state() == DeviceState::kReady);
+  CHECK(rig.node.value({0x1A00, 0}) == 2);
+  CHECK(rig.node.value({0x1A00, 2}) == 0x60000208);
+  CHECK(rig.node.value({0x6207, 2}) == 1);
+  CHECK(rig.node.lamps() == 0x8000);
+  CHECK(rig.taken().empty());  // both bytes were read before it counted as there
+  rig.press(kRested | 0x200);
+  rig.press(kRested | 0x8000);
+  CHECK(rig.taken() == Actions{OperatorAction::kPlay, OperatorAction::kConfirm});
+}
+
+TEST_CASE("other wiring: a stop that closes, lamps elsewhere", "[can][panel]") {
   CanPanelOptions options;
   options.wiring = {5, 6, -1, -1, false, 7, -1, 4, -1};
   Rig rig(options);

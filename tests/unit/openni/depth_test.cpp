@@ -14,7 +14,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 using namespace firstlook;
-using firstlook::openni::DeviceClock;
+using firstlook::hal::DeviceClock;
 using firstlook::openni::OpenNiDepth;
 using firstlook::openni::OpenNiDepthOptions;
 using hal::DeviceState;

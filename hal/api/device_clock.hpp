@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace firstlook::openni {
+namespace firstlook::hal {
 
 /// A frame is delayed by a varying time, never hurried: the smallest difference seen is the best. Clocks drift, so that
 /// difference is let go slowly (100 ppm are more than two quartzes differ by).
@@ -30,4 +30,4 @@ class DeviceClock {
   std::int64_t last_device_ns_ = 0, last_arrived_ns_ = 0;
 };
 
-}  // namespace firstlook::openni
+}  // namespace firstlook::hal
