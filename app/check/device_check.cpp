@@ -154,7 +154,10 @@ class AbsentDevice final : public WatchedDevice {
     report_.state = DeviceState::kMissing;
     report_.device.set("{}", device);
     report_.detail.set("{}", error.detail());
-    report_.remedy.set("{}", fault_row(error.fault).remedy);
+    const bool no_room = error.fault == Fault::kOutOfMemory;
+    report_.remedy.set("{}", no_room
+                                 ? "32 frames are held: choose a smaller picture, or a format with fewer bytes a pixel."
+                                 : fault_row(error.fault).remedy);
   }
   void poll(Instant) override {}
   [[nodiscard]] Instant next_due() const override { return {INT64_MAX / 2}; }

@@ -220,7 +220,10 @@ void RemoteIo::handle(const can_frame& frame, Instant now) {
     handle_error(*error, now);
     return;
   }
-  if (step_ == NodeStep::kBusOff) reset(now);  // a frame came through: the controller is back
+  if (step_ == NodeStep::kBusOff) {  // a frame came through: the controller is back
+    step_ = NodeStep::kAwaitingBoot;
+    due_ = now;
+  }
   if (const auto heartbeat = read_heartbeat(frame)) {
     handle_heartbeat(*heartbeat, now);
   } else if (const auto answer = read_sdo_answer(frame); answer && answer->node == options_.node) {
@@ -249,7 +252,7 @@ void RemoteIo::handle_error(const BusError& error, Instant now) {
   if (error.bus_off && step_ != NodeStep::kBusOff) {
     ++counters_.bus_off;
     leave(NodeStep::kBusOff, LossCause::kBusOff);
-    due_ = now;
+    due_ = now + options_.boot_timeout;
   }
   if (error.restarted && step_ == NodeStep::kBusOff) {
     error_passive_ = false;
@@ -412,8 +415,14 @@ void RemoteIo::keep_times(Instant now) {
         outputs_refresh_ = now + kOutputsRefresh;
       }
       break;
-    case NodeStep::kNoBus:
     case NodeStep::kBusOff:
+      // It may have been restarted without our hearing of it, and the node waits for its reset.
+      if (now >= due_) {
+        due_ = now + options_.boot_timeout;
+        (void)send(nmt_command(NmtCommand::kResetCommunication, options_.node), now);
+      }
+      break;
+    case NodeStep::kNoBus:
       break;
   }
 }

@@ -127,7 +127,8 @@ TEST_CASE("a device that could not be made says why", "[check]") {
   const Error error = failure(Fault::kOutOfMemory, "colour camera slots: too many bytes").error();
   const CheckResult result{watch_devices(only("colour camera", absent_device("/dev/video9", error)), clock), {}};
   CHECK_FALSE(result.all_ready());
-  CHECK_THAT(check_text(result), Contains("/dev/video9: colour camera slots: too many bytes") && Contains("to do:"));
+  CHECK_THAT(check_text(result), Contains("/dev/video9: colour camera slots: too many bytes") &&
+                                     Contains("to do:      32 frames are held: choose a smaller picture"));
 }
 
 TEST_CASE("the check asks for what no device can tell", "[check]") {
