@@ -12,7 +12,8 @@ namespace {
 // ITU-R BT.601, 16 bits behind the point, rounded to the nearest.
 constexpr int kBits = 16;
 constexpr int kHalf = 1 << (kBits - 1);
-constexpr int fixed(double v) { return static_cast<int>(v * (1 << kBits) + 0.5); }
+/// Of positive factors: twice as much, cut, and halved upwards.
+constexpr int fixed(double v) { return (static_cast<int>(v * (2 << kBits)) + 1) / 2; }
 
 /// Factors for one range of the codes: luma 219 and chroma 224 steps, or 255 each.
 struct Factors {

@@ -46,7 +46,6 @@ using MockDepth = Mock<mock::MockDepthCamera, std::uint16_t>;
 class DrivenCamera final : public hal::ColorCamera {
  public:
   DrivenCamera() {
-    memory::reset_accounts();
     v4l2::V4l2CameraOptions options;
     options.capture.device = kernel_.path;
     options.capture.width = kWidth;
