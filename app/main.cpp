@@ -11,9 +11,12 @@
 #include <system_error>
 
 #include "algorithms/kinematics/near_dh.hpp"
+#include "app/check/check_report.hpp"
+#include "app/check/device_check.hpp"
 #include "app/cli/cli.hpp"
 #include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
+#include "app/real_devices.hpp"
 #include "app/report/checkpoint.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"
@@ -341,6 +344,11 @@ std::optional<CutOffRun> run_to_resume(const RunCommand& command, Narrator& narr
   return cut_off;
 }
 
+/// The boards that the configuration names; load_config has refused what is no board.
+std::vector<NamedTarget> boards_of(const Config& config) {
+  return names_boards(config) ? targets_of(config).value() : std::vector<NamedTarget>();
+}
+
 int run_job(const RunCommand& command) {
   auto loaded = load_config(command.sources);
   if (!loaded) return fail(loaded.error());
@@ -359,8 +367,6 @@ int run_job(const RunCommand& command) {
       command.out.empty() ? fmt::format("{}/{}-{}", kRunsFolder, utc_date_for_name(), config.seed) : command.out;
   if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
 
-  std::vector<NamedTarget> boards;  // load_config has refused what is no board
-  if (names_boards(config)) boards = targets_of(config).value();
   sim::ur::TruthReader truth;
   if (config.robot.given()) {
     if (config.calibration.touch_test == "yes") {
@@ -370,7 +376,7 @@ int run_job(const RunCommand& command) {
     if (const Status followed = follow_true_joints(config, truth); !followed) return fail(followed.error());
   }
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, boards, config.depth.sensor,
+                                        command.faults, config.workers, boards_of(config), config.depth.sensor,
                                         config.robot.given() ? &truth : nullptr});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
@@ -460,6 +466,44 @@ int run_job(const RunCommand& command) {
   return ran ? exit_code_of((*cart)->ending()) : exit_code_of(ran.error());
 }
 
+/// Asks the devices that the configuration names, and those of the simulated cell in place of the others.
+int run_check(const CheckCommand& command) {
+  auto loaded = load_config(command.sources);
+  if (!loaded) return fail(loaded.error());
+  Config config = loaded->config;
+  auto checks = real_device_checks(config);
+  if (!checks) return fail(checks.error());
+  const bool simulated = checks->empty();
+  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), true, "", config.workers,
+                                        boards_of(config), config.depth.sensor});
+  if (!cell) return fail(cell.error());
+  sim::SimulatedCell& world = **cell;
+  if (simulated) describe_cell(world.description(), config);
+  const auto stand_in = [&](std::string_view role, std::unique_ptr<WatchedDevice> device) {
+    if (std::ranges::find(*checks, role, &DeviceCheck::role) != checks->end()) return;
+    checks->push_back({std::string(role), true, std::move(device)});
+  };
+  stand_in(kArmRole, watch_arm(world.arm(), nullptr));
+  stand_in(kColorRole, watch_stream(world.color(), nullptr));
+  stand_in(kDepthRole, watch_stream(world.depth(), nullptr));
+  stand_in(kPendantRole, watch_pendant(world.pendant(), nullptr));
+  stand_in(kPanelRole, watch_panel(world.panel(), nullptr));
+  constexpr std::string_view kOrder[] = {kArmRole, kColorRole, kDepthRole, kPendantRole, kPanelRole};
+  std::ranges::sort(*checks, {}, [&](const DeviceCheck& check) { return std::ranges::find(kOrder, check.role); });
+  std::unique_ptr<Clock> clock;
+  if (simulated) {
+    clock = std::make_unique<VirtualClock>();
+  } else {
+    clock = std::make_unique<RealClock>();
+  }
+  Narrator narrator;
+  narrator.line(simulated ? fmt::format("no device is configured: those of the simulated cell {}", config.cell)
+                          : fmt::format("what is not configured is of the simulated cell {}", config.cell));
+  CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};
+  std::fputs((command.json ? check_json(result) : check_text(result)).c_str(), stdout);
+  return result.all_ready() ? kDone : kDevice;
+}
+
 /// The faults are the simulated cell's: what it would refuse in every cell is refused once, before the first.
 int run_campaign_of(const CampaignCommandOptions& options) {
   if (const auto faults = sim::parse_faults(options.faults); !faults) return fail(faults.error());
@@ -543,6 +587,8 @@ struct Dispatch {
   int operator()(const CampaignCommandOptions& c) const { return run_campaign_of(c); }
   int operator()(const UrSimCommand& c) const { return run_ur_sim(c); }
   int operator()(const UrScriptCommand& c) const { return run_ur_script(c); }
+  int operator()(const CheckCommand& c) const { return run_check(c); }
+  int operator()(const BundleCommandOptions& c) const { return run_bundle_command(c); }
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);

@@ -246,6 +246,23 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->capture_default_str();
   ur_script_app->add_option("-o,--out", ur_script.out, "file to write; -: stdout")->capture_default_str();
 
+  CheckCommand check;
+  ConfigFlags check_flags;
+  CLI::App* check_app = app.add_subcommand(
+      "check",
+      "asks every device, one line each, and says what to do; those of a simulated cell where none is configured");
+  check_flags.add_to(*check_app);
+  check_app->add_flag("--json", check.json, "print what was found as JSON");
+  check_app->footer(
+      "Exit codes: 0 all are ready, 3 configuration, 4 a device is missing, lost or another than expected.");
+
+  BundleCommandOptions bundle;
+  std::string bundle_config;
+  CLI::App* bundle_app = app.add_subcommand("bundle", "a run for support: its files, configuration, versions, status");
+  bundle_app->add_option("run", bundle.folder, "folder of a run")->required();
+  bundle_app->add_option("-o,--out", bundle.out, "archive to write (default RUN.tar.gz in the working directory)");
+  bundle_app->add_option("--config", bundle_config, "configuration file (YAML) of the cart");
+
   ReplayCommand replay;
   CLI::App* replay_app = app.add_subcommand("replay", "run a journal's events again and compare every decision");
   replay_app->add_option("journal", replay.journal, "journal.flj of a run")->required();
@@ -303,6 +320,15 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   if (campaign_app->parsed()) return {campaign, 0};
   if (ur_sim_app->parsed()) return {ur_sim, 0};
   if (ur_script_app->parsed()) return {ur_script, 0};
+  if (check_app->parsed()) {
+    check.sources = check_flags.sources();
+    return {check, 0};
+  }
+  if (bundle_app->parsed()) {
+    if (!bundle_config.empty()) bundle.sources.file = bundle_config;
+    bundle.sources.environment = process_environment();
+    return {bundle, 0};
+  }
   if (replay_app->parsed()) return {replay, 0};
   if (states_app->parsed()) return {StatesCommand{}, 0};
   if (explain_app->parsed()) return {explain, 0};

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/cli/board_command.hpp"
+#include "app/cli/bundle_command.hpp"
 #include "app/cli/calibrate_command.hpp"
 #include "app/cli/campaign_command.hpp"
 #include "app/cli/export_command.hpp"
@@ -35,6 +36,10 @@ struct UrScriptCommand {
   int port = 50001;
   std::string out = "firstlook.script";  ///< "-": stdout
 };
+struct CheckCommand {
+  ConfigSources sources;
+  bool json = false;
+};
 struct ReplayCommand {
   std::string journal;
 };
@@ -57,7 +62,7 @@ struct UrSimCommand {
 
 using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,
                              BoardCommandOptions, CampaignCommandOptions, ReplayCommand, StatesCommand, ExplainCommand,
-                             ConfigCommandOptions, UrSimCommand, UrScriptCommand>;
+                             ConfigCommandOptions, UrSimCommand, UrScriptCommand, CheckCommand, BundleCommandOptions>;
 
 /// Either a command, or the exit code after help, version or an error of usage were printed.
 struct ParsedCommandLine {

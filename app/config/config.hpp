@@ -123,6 +123,36 @@ struct Config {
     bool operator==(const Calibration&) const = default;
   } calibration;
 
+  struct Camera {
+    std::string device = "none";  ///< /dev/v4l/by-id/... | freenect | none: the simulated cell's camera
+    int width = 640, height = 480;
+    std::string format = "auto";  ///< auto | YUYV | NV12 | GREY | MJPG
+    double rate_hz = 30;
+    int exposure_us = 0;        ///< fixed for the job; 0: as the camera has it
+    int gain = -1;              ///< -1: as the camera has it
+    int focus = -1;             ///< -1: as the camera has it
+    int white_balance_k = 0;    ///< 0: as the camera has it
+    std::string info = "none";  ///< camera_info.yaml; none: intrinsics are not known
+    bool operator==(const Camera&) const = default;
+  } camera;
+
+  struct Panel {
+    std::string can_interface = "none";  ///< of Linux: can0; none: the simulated cell's panel
+    int node_id = 10;
+    std::int64_t vendor_id = 0;     ///< of object 1018h; 0: any
+    std::int64_t product_code = 0;  ///< of object 1018h; 0: any
+    int start_input = 0;            ///< numbers of bits; -1: there is none
+    int stop_input = 1;
+    int confirm_input = 2;
+    int enabling_input = 3;
+    std::string stop_contact = "opens";  ///< opens | closes when pressed
+    int red_output = 0;
+    int amber_output = 1;
+    int green_output = 2;
+    int buzzer_output = 3;
+    bool operator==(const Panel&) const = default;
+  } panel;
+
   struct Depth {
     std::string sensor = "kinect";  ///< whose figures the fields below are where no key overrides them
     double range_min_m = 0.5;
@@ -134,6 +164,8 @@ struct Config {
     double crop_m = 0;               ///< returns beyond it are left out; 0: none is
     double filter_voxel_m = 0;       ///< of returns in one cube of this edge one is kept; 0: all are
     int plane_fit_px = 0;            ///< window of the plane fit before insertion; 0: there is none
+    std::string device = "none";     ///< openni | its URI | FILE.oni | freenect[:SERIAL] | none: the simulated cell's
+    std::string info = "none";       ///< camera_info.yaml; none: by the device's field of view
     /// Standard deviation of a depth.
     [[nodiscard]] double sigma_m(double z_m) const { return std::hypot(noise_floor_m, noise_at_1m_m * z_m * z_m); }
     bool operator==(const Depth&) const = default;

@@ -8,6 +8,7 @@
 #include "algorithms/vision/detector_presets.hpp"
 #include "algorithms/vision/target_names.hpp"
 #include "app/config/board_config.hpp"
+#include "app/config/device_keys.hpp"
 #include "app/machine/job_types.hpp"
 #include "platform/loop/worker_pool.hpp"
 
@@ -286,6 +287,20 @@ void add_depth_keys(Keys& keys, Config& c) {
                   {},
                   "side of a window (odd); where its returns lie on a plane within the noise, that plane is mapped; 0: "
                   "off"});
+  keys.push_back(
+      {"depth.device",
+       &c.depth.device,
+       0,
+       0,
+       {},
+       "depth camera. openni: the first one that OpenNI finds, or its URI, or a recording FILE.oni; freenect, or "
+       "freenect:SERIAL: a Kinect v1; none: the simulated cell's"});
+  keys.push_back({"depth.info",
+                  &c.depth.info,
+                  0,
+                  0,
+                  {},
+                  "camera_info.yaml with its intrinsics; none: by the field of view that the device states"});
 }
 
 void add_map_keys(Keys& keys, Config& c) {
@@ -426,9 +441,11 @@ std::vector<ConfigKey> config_keys(Config& config) {
   add_robot_keys(keys, config);
   add_space_keys(keys, config);
   add_calibration_keys(keys, config);
+  for (const ConfigKey& key : camera_keys(config.camera)) keys.push_back(key);
   add_depth_keys(keys, config);
   add_map_keys(keys, config);
   add_margin_keys(keys, config);
+  for (const ConfigKey& key : panel_keys(config.panel)) keys.push_back(key);
   return keys;
 }
 
@@ -467,6 +484,7 @@ std::string broken_rule(const Config& c) {
     }
   }
   if (std::string rule = broken_fine_map_rule(c.map); !rule.empty()) return rule;
+  if (std::string rule = broken_panel_rule(c.panel); !rule.empty()) return rule;
   if (!planes_from_words(c.map.planes)) return "map.planes must be none, or color, label, sensor with commas between";
   if (c.depth.crop_m > 0 && c.depth.crop_m <= c.depth.range_min_m) return "depth.crop_m must exceed depth.range_min_m";
   if (c.depth.filter_voxel_m > 0 && c.depth.filter_voxel_m < 0.005) {

@@ -32,6 +32,8 @@ enum class Pool : std::uint8_t {
   kThreadStacks,
   kJobHeap,
   kLibraryPages,
+  kColorSlots,
+  kDepthSlots,
 };
 
 struct BudgetRow {
@@ -66,6 +68,8 @@ inline constexpr std::array kBudget = {
     BudgetRow{Pool::kThreadStacks,     "thread stacks",       kThreadsMax, kThreadStackBytes, "all", "created at boot"},
     BudgetRow{Pool::kJobHeap,          "job heap allowance",  2,  kJobHeapBytes,    "jobs",        "what OpenCV and Eigen allocate inside a job; more fails the job"},
     BudgetRow{Pool::kLibraryPages,     "library pages",       1,  45 * kMiB,        "all",         "code and data of the shared libraries under mlockall, as measured"},
+    BudgetRow{Pool::kColorSlots,       "colour camera slots", 32, 640 * 480 * 2,    "loop",        "the last frames of a real camera, as its driver gave them; none in a simulated cell"},
+    BudgetRow{Pool::kDepthSlots,       "depth camera slots",  32, 640 * 480 * 2,    "loop",        "the same of a real depth camera"},
 };
 // clang-format on
 

@@ -3,9 +3,11 @@
 #include <cmath>
 #include <vector>
 
+#include "hal/v4l2/v4l2_camera.hpp"
 #include "tests/conformance/simulated_devices.hpp"
 #include "tests/support/mock_color_camera.hpp"
 #include "tests/support/mock_depth_camera.hpp"
+#include "tests/support/simulated_v4l2_kernel.hpp"
 
 using namespace firstlook;
 
@@ -40,6 +42,48 @@ struct MockWithColors : MockColor {
 };
 using MockDepth = Mock<mock::MockDepthCamera, std::uint16_t>;
 
+/// The V4L2 driver above a simulated kernel, whose time is that of the polls.
+class DrivenCamera final : public hal::ColorCamera {
+ public:
+  DrivenCamera() {
+    v4l2::V4l2CameraOptions options;
+    options.capture.device = kernel_.path;
+    options.capture.width = kWidth;
+    options.capture.height = kHeight;
+    options.capture.formats.push_back(v4l2::PixelFormat::kYuyv);
+    options.intrinsics = {kWidth, kHeight, 60, 60, 31.5, 23.5};
+    kernel_.picture = [](std::uint32_t n) {
+      std::vector<std::uint8_t> bytes(2 * kWidth * kHeight, 128);
+      for (std::size_t i = 0; i < bytes.size(); i += 2) bytes[i] = static_cast<std::uint8_t>(20 + (i / 8 + n) % 200);
+      return bytes;
+    };
+    camera_ = std::move(*v4l2::V4l2Camera::make(kernel_, options));
+    REQUIRE_FALSE(camera_->poll(at(0)).has_value());  // opens it
+  }
+  void lose(std::uint32_t sequence) { kernel_.lost.insert(sequence); }
+  const CameraIntrinsics& intrinsics() const override { return camera_->intrinsics(); }
+  std::optional<hal::Frame> poll(Instant now) override {
+    kernel_.set_now(now);
+    return camera_->poll(now);
+  }
+  Instant next_due() const override { return camera_->next_due(); }
+  hal::StreamCounters counters() const override { return camera_->counters(); }
+  Status read(const hal::Frame& frame, MutableGrayImage image) override { return camera_->read(frame, image); }
+  bool delivers_color() const override { return camera_->delivers_color(); }
+  Status read_color(const hal::Frame& frame, ImageView<std::array<std::uint8_t, 3>> image) override {
+    return camera_->read_color(frame, image);
+  }
+  std::optional<hal::CornerObservation> read_corners(const hal::Frame& frame, int target) override {
+    return camera_->read_corners(frame, target);
+  }
+
+ private:
+  static constexpr int kWidth = 64, kHeight = 48;
+  test::SimulatedV4l2Kernel kernel_;
+  std::unique_ptr<v4l2::V4l2Camera> camera_;
+};
+using DrivenColor = Mock<DrivenCamera, std::uint8_t>;
+
 template <typename Pixel>
 struct Image {
   explicit Image(const CameraIntrinsics& i)
@@ -54,7 +98,7 @@ struct Image {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a camera keeps the order of its frames and never delivers the future", "[hal][camera]",
-                   SimulatedColor, SimulatedDepth, MockColor, MockDepth) {
+                   SimulatedColor, SimulatedDepth, MockColor, MockDepth, DrivenColor) {
   TestType device;
   Instant last{-1};
   std::optional<std::uint32_t> sequence;
@@ -87,7 +131,7 @@ TEMPLATE_TEST_CASE("a camera that is polled late gives its newest frame", "[hal]
 }
 
 TEMPLATE_TEST_CASE("lost frames leave gaps in the sequence and are counted", "[hal][camera]", SimulatedColor,
-                   SimulatedDepth, MockColor, MockDepth) {
+                   SimulatedDepth, MockColor, MockDepth, DrivenColor) {
   TestType device;
   std::uint64_t received = 0;
   std::uint32_t last = 0;
@@ -104,7 +148,7 @@ TEMPLATE_TEST_CASE("lost frames leave gaps in the sequence and are counted", "[h
 }
 
 TEMPLATE_TEST_CASE("a camera holds its last 32 frames, and says when one is gone", "[hal][camera]", SimulatedColor,
-                   SimulatedDepth, MockColor, MockDepth) {
+                   SimulatedDepth, MockColor, MockDepth, DrivenColor) {
   TestType device;
   std::vector<hal::Frame> frames;
   while (frames.size() < 150) {
@@ -119,7 +163,7 @@ TEMPLATE_TEST_CASE("a camera holds its last 32 frames, and says when one is gone
 }
 
 TEMPLATE_TEST_CASE("reading is repeatable and refuses an image of the wrong size", "[hal][camera]", SimulatedColor,
-                   SimulatedDepth, MockColor, MockDepth) {
+                   SimulatedDepth, MockColor, MockDepth, DrivenColor) {
   TestType device;
   const auto frame = device.camera.poll(at(1));
   REQUIRE(frame.has_value());
@@ -137,7 +181,7 @@ TEMPLATE_TEST_CASE("reading is repeatable and refuses an image of the wrong size
 }
 
 TEMPLATE_TEST_CASE("a camera with colours gives them as it gives grey values, a grey one says that it has none",
-                   "[hal][camera]", SimulatedColor, MockColor, MockWithColors) {
+                   "[hal][camera]", SimulatedColor, MockColor, MockWithColors, DrivenColor) {
   TestType device;
   const auto frame = device.camera.poll(at(1));
   REQUIRE(frame.has_value());

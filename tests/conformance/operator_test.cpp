@@ -1,10 +1,14 @@
 /// What every pendant and panel must do, whoever implements it.
 #include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
 #include <string>
 
+#include "hal/can/can_panel.hpp"
 #include "hal/sim/simulated_operator.hpp"
 #include "tests/support/mock_panel.hpp"
 #include "tests/support/mock_pendant.hpp"
+#include "tests/support/simulated_can_kernel.hpp"
 
 using namespace firstlook;
 
@@ -46,6 +50,29 @@ struct MockPanel {
   bool told() const { return device.lights == std::vector<hal::Light>{hal::Light::kAmber}; }
 };
 
+/// The CAN driver with a simulated module on a simulated bus.
+struct DrivenPanel {
+  DrivenPanel() {
+    kernel.attach(node);
+    node.power(true);
+  }
+  static std::string sheet() {
+    std::ifstream file(FIRSTLOOK_SOURCE_DIR "/hal/can/firstlook_panel.eds");
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void tell() { device.light(hal::Light::kAmber); }
+  bool told() {
+    for (int ms = 0; ms < 1000; ++ms) {
+      kernel.turn(Instant{} + milliseconds(ms));
+      (void)device.poll(Instant{} + milliseconds(ms));
+    }
+    return node.lamps() == can::output_bits({}, hal::Light::kAmber, false);
+  }
+  test::SimulatedCanKernel kernel;
+  test::SimulatedIoNode node{sheet(), 10};
+  can::CanPanel device{kernel, {}};
+};
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("keys come once, in order, and not before they are pressed", "[hal][operator]", SimulatedPendant,
@@ -67,8 +94,8 @@ TEMPLATE_TEST_CASE("keys come once, in order, and not before they are pressed", 
   CHECK(d.device.next_due() > at(1e6));
 }
 
-TEMPLATE_TEST_CASE("what is shown arrives", "[hal][operator]", SimulatedPendant, SimulatedPanel, MockPendant,
-                   MockPanel) {
+TEMPLATE_TEST_CASE("what is shown arrives", "[hal][operator]", SimulatedPendant, SimulatedPanel, MockPendant, MockPanel,
+                   DrivenPanel) {
   TestType d;
   d.tell();
   CHECK(d.told());

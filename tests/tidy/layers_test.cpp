@@ -19,9 +19,14 @@ const std::vector<Rule> kRules = {
     {"platform/", {"platform/"}},
     {"algorithms/", {"algorithms/", "platform/core/"}},
     {"hal/api/", {"hal/api/", "platform/"}},
+    {"hal/can/", {"hal/can/", "hal/api/", "platform/"}},
     {"hal/ur/", {"hal/ur/", "hal/api/", "platform/"}},
+    {"hal/freenect/", {"hal/freenect/", "hal/api/", "platform/"}},
+    {"hal/openni/", {"hal/openni/", "hal/api/", "platform/"}},
+    {"hal/v4l2/", {"hal/v4l2/", "hal/api/", "platform/"}},
     {"hal/sim/", {"hal/sim/", "hal/api/", "platform/", "algorithms/"}},
     {"app/main.cpp", {"app/", "hal/", "platform/", "algorithms/"}},
+    {"app/real_devices.", {"app/", "hal/", "platform/", "algorithms/"}},  // a part of main.cpp
     {"app/", {"app/", "hal/api/", "platform/", "algorithms/"}},
 };
 const std::vector<std::string> kTops = {"platform/", "hal/", "algorithms/", "app/", "tests/", "toolchain/"};
@@ -87,6 +92,7 @@ TEST_CASE("the layer check finds a breach", "[tidy]") {
   CHECK_FALSE(allowed("platform/core/result.hpp", "platform/loop/clock.hpp"));
   CHECK_FALSE(allowed("app/machine/machine.cpp", "hal/sim/grader.hpp"));
   CHECK_FALSE(allowed("hal/sim/scene.cpp", "app/config/config.hpp"));
+  CHECK_FALSE(allowed("hal/can/can_panel.cpp", "hal/v4l2/v4l2_camera.hpp"));
   CHECK(allowed("app/main.cpp", "hal/sim/simulated_cell.hpp"));
 }
 
