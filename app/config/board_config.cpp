@@ -65,4 +65,8 @@ bool names_a_board(const Config::Board& board) {
 
 bool names_boards(const Config& config) { return !config.boards.empty() || names_a_board(config.board); }
 
+std::vector<NamedTarget> configured_boards(const Config& config) {
+  return names_boards(config) ? targets_of(config).value() : std::vector<NamedTarget>();
+}
+
 }  // namespace firstlook

@@ -23,5 +23,7 @@ void set_board(const BoardSpec& board, Config::Board& config);
 /// True for keys that somebody changed: boards of his own, not those that a simulated cell brings along.
 [[nodiscard]] bool names_a_board(const Config::Board& board);
 [[nodiscard]] bool names_boards(const Config& config);
+/// The boards that the configuration names, if it names any; load_config has refused what is no board.
+[[nodiscard]] std::vector<NamedTarget> configured_boards(const Config& config);
 
 }  // namespace firstlook

@@ -159,13 +159,15 @@ struct Config {
     double range_max_m = 5.0;
     double range_trusted_m = 3.0;
     double noise_floor_m = 0;
-    double noise_at_1m_m = 0.00285;  ///< times z²
-    double baseline_m = 0.075;       ///< to the projector or second camera
-    double crop_m = 0;               ///< returns beyond it are left out; 0: none is
-    double filter_voxel_m = 0;       ///< of returns in one cube of this edge one is kept; 0: all are
-    int plane_fit_px = 0;            ///< window of the plane fit before insertion; 0: there is none
-    std::string device = "none";     ///< openni | its URI | FILE.oni | freenect[:SERIAL] | none: the simulated cell's
-    std::string info = "none";       ///< camera_info.yaml; none: by the device's field of view
+    double noise_at_1m_m = 0.00285;   ///< times z²
+    double baseline_m = 0.075;        ///< to the projector or second camera
+    double crop_m = 0;                ///< returns beyond it are left out; 0: none is
+    double filter_voxel_m = 0;        ///< of returns in one cube of this edge one is kept; 0: all are
+    int plane_fit_px = 0;             ///< window of the plane fit before insertion; 0: there is none
+    std::string device = "none";      ///< openni | its URI | FILE.oni | freenect[:SERIAL] | none: the simulated cell's
+    std::string info = "none";        ///< camera_info.yaml; none: by the device's field of view
+    std::array<double, 3> mount_m{};  ///< on the colour camera, of a real one: camera_T_depth as its maker states it
+    std::array<double, 3> mount_rpy_deg{};  ///< the same: about x, then y, then z of the colour camera
     /// Standard deviation of a depth.
     [[nodiscard]] double sigma_m(double z_m) const { return std::hypot(noise_floor_m, noise_at_1m_m * z_m * z_m); }
     bool operator==(const Depth&) const = default;

@@ -301,6 +301,18 @@ void add_depth_keys(Keys& keys, Config& c) {
                   0,
                   {},
                   "camera_info.yaml with its intrinsics; none: by the field of view that the device states"});
+  keys.push_back({"depth.mount_m",
+                  &c.depth.mount_m,
+                  -1,
+                  1,
+                  {},
+                  "where a real depth camera sits in the frame of the colour camera (x right, y down, z ahead)"});
+  keys.push_back({"depth.mount_rpy_deg",
+                  &c.depth.mount_rpy_deg,
+                  -180,
+                  180,
+                  {},
+                  "how it is turned there: about x, then y, then z of the colour camera"});
 }
 
 void add_map_keys(Keys& keys, Config& c) {

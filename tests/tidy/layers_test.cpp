@@ -26,7 +26,7 @@ const std::vector<Rule> kRules = {
     {"hal/v4l2/", {"hal/v4l2/", "hal/api/", "platform/"}},
     {"hal/sim/", {"hal/sim/", "hal/api/", "platform/", "algorithms/"}},
     {"app/main.cpp", {"app/", "hal/", "platform/", "algorithms/"}},
-    {"app/real_devices.", {"app/", "hal/", "platform/", "algorithms/"}},  // a part of main.cpp
+    {"app/wiring/", {"app/", "hal/", "platform/", "algorithms/"}},
     {"app/", {"app/", "hal/api/", "platform/", "algorithms/"}},
 };
 const std::vector<std::string> kTops = {"platform/", "hal/", "algorithms/", "app/", "tests/", "toolchain/"};

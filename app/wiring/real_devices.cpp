@@ -1,6 +1,8 @@
-#include "app/real_devices.hpp"
+#include "app/wiring/real_devices.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "app/dataset/calibration_dataset.hpp"
@@ -9,6 +11,7 @@
 #include "hal/openni/openni_depth.hpp"
 #include "hal/v4l2/threaded_camera.hpp"
 #include "platform/linux/system_calls.hpp"
+#include "platform/loop/event.hpp"
 
 namespace firstlook {
 namespace {
@@ -53,9 +56,13 @@ can::CanPanelOptions panel_options(const Config::Panel& p) {
   return options;
 }
 
-/// The intrinsics of a file, for pictures of this size. "none": a size alone.
+/// The intrinsics of a file, for pictures of this size. "none": those of a lens of 60 degrees, where a calibration that
+/// estimates them begins.
 Result<CameraIntrinsics> intrinsics_of(const std::string& file, int width, int height) {
-  if (file == "none") return CameraIntrinsics{width, height};
+  if (file == "none") {
+    const double focal_px = width / (2 * std::tan(std::numbers::pi / 6));
+    return CameraIntrinsics{width, height, focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
+  }
   const Result<CameraIntrinsics> read = read_camera_info(file);
   if (read && (read->width != width || read->height != height)) {
     return failure(Fault::kConfigBadValue, "{} is of {} x {} pixels, the camera's pictures are {} x {}", file,
@@ -97,17 +104,13 @@ Result<openni::OpenNiDepthOptions> depth_options(const Config::Depth& d) {
   return options;
 }
 
-}  // namespace
-
-namespace {
-
 constexpr std::string_view kKinect = "freenect";
 
 /// "freenect" or "freenect:SERIAL".
 bool is_kinect(std::string_view device) { return device == kKinect || device.starts_with("freenect:"); }
 
-/// The Kinect behind one camera or both.
-Status add_kinect(const Config& config, std::vector<DeviceCheck>& checks) {
+/// The Kinect behind one camera or both. Errors: those of a camera_info.yaml; a Kinect that is not there is none.
+Result<freenect::KinectOptions> kinect_options(const Config& config) {
   freenect::KinectOptions options;
   options.usb.depth = is_kinect(config.depth.device);
   options.usb.color = is_kinect(config.camera.device);
@@ -124,22 +127,70 @@ Status add_kinect(const Config& config, std::vector<DeviceCheck>& checks) {
     if (!read) return std::unexpected(read.error());
     options.color_intrinsics = *read;
   }
-  auto made = freenect::Kinect::make(kernel(), options);
-  if (!made) {
-    if (options.usb.color) checks.push_back({std::string(kColorRole), false, absent_device(kKinect, made.error())});
-    if (options.usb.depth) checks.push_back({std::string(kDepthRole), false, absent_device(kKinect, made.error())});
-    return {};
-  }
-  const std::shared_ptr<freenect::Kinect> kinect = std::move(*made);
+  return options;
+}
+
+Status add_kinect(const Config& config, std::vector<DeviceCheck>& checks) {
+  const auto options = kinect_options(config);
+  if (!options) return std::unexpected(options.error());
+  auto made = freenect::Kinect::make(kernel(), *options);
+  const auto add = [&](std::string_view role, auto watch) {
+    if (!made) {
+      checks.push_back({std::string(role), false, absent_device(kKinect, made.error())});
+    } else {
+      checks.push_back({std::string(role), false, watch()});
+    }
+  };
+  const std::shared_ptr<freenect::Kinect> kinect = made ? std::move(*made) : nullptr;
   using Owned = OwnedDevice<freenect::Kinect>;
-  if (options.usb.color) {
-    const auto watch = [](freenect::Kinect& k) { return watch_stream(k.color(), &k.color_report()); };
-    checks.push_back({std::string(kColorRole), false, std::make_unique<Owned>(kinect, watch)});
+  if (options->usb.color) {
+    add(kColorRole, [&] {
+      return std::make_unique<Owned>(kinect,
+                                     [](freenect::Kinect& k) { return watch_stream(k.color(), &k.color_report()); });
+    });
   }
-  if (options.usb.depth) {
-    const auto watch = [](freenect::Kinect& k) { return watch_stream(k.depth(), &k.depth_report()); };
-    checks.push_back({std::string(kDepthRole), false, std::make_unique<Owned>(kinect, watch)});
+  if (options->usb.depth) {
+    add(kDepthRole, [&] {
+      return std::make_unique<Owned>(kinect,
+                                     [](freenect::Kinect& k) { return watch_stream(k.depth(), &k.depth_report()); });
+    });
   }
+  return {};
+}
+
+Result<std::unique_ptr<v4l2::ThreadedCamera>> make_v4l2(const Config& config, const CameraIntrinsics& intrinsics) {
+  return v4l2::ThreadedCamera::make(kernel(), camera_options(config.camera, intrinsics));
+}
+
+std::unique_ptr<can::CanPanel> make_panel(const Config& config) {
+  return std::make_unique<can::CanPanel>(kernel(), panel_options(config.panel));
+}
+
+class NoPanel final : public hal::Panel {
+ public:
+  [[nodiscard]] std::optional<hal::OperatorEvent> poll(Instant) override { return std::nullopt; }
+  [[nodiscard]] Instant next_due() const override { return kNever; }
+  void light(hal::Light) override {}
+};
+
+Status open_kinect(const Config& config, RealDevices& devices) {
+  const auto options = kinect_options(config);
+  if (!options) return std::unexpected(options.error());
+  auto made = freenect::Kinect::make(kernel(), *options);
+  if (!made) return std::unexpected(made.error());
+  const std::shared_ptr<freenect::Kinect> kinect = std::move(*made);
+  if (options->usb.color) devices.color = &kinect->color();
+  if (options->usb.depth) devices.depth = &kinect->depth();
+  devices.owned.push_back(kinect);
+  return {};
+}
+
+/// Takes what was made, or its error.
+template <typename Device, typename Interface>
+Status take(Result<std::unique_ptr<Device>> made, Interface*& place, RealDevices& devices) {
+  if (!made) return std::unexpected(made.error());
+  place = made->get();
+  devices.owned.push_back(std::shared_ptr<Device>(std::move(*made)));
   return {};
 }
 
@@ -147,6 +198,31 @@ Status add_kinect(const Config& config, std::vector<DeviceCheck>& checks) {
 
 bool names_real_devices(const Config& config) {
   return config.camera.device != "none" || config.depth.device != "none" || config.panel.can_interface != "none";
+}
+
+Result<RealDevices> open_real_devices(const Config& config) {
+  RealDevices devices;
+  if (is_kinect(config.camera.device) || is_kinect(config.depth.device)) {
+    if (const Status opened = open_kinect(config, devices); !opened) return std::unexpected(opened.error());
+  }
+  if (devices.color == nullptr) {
+    const auto intrinsics = intrinsics_of(config.camera.info, config.camera.width, config.camera.height);
+    if (!intrinsics) return std::unexpected(intrinsics.error());
+    const Status opened = take(make_v4l2(config, *intrinsics), devices.color, devices);
+    if (!opened) return std::unexpected(opened.error());
+  }
+  if (devices.depth == nullptr) {
+    const auto options = depth_options(config.depth);
+    if (!options) return std::unexpected(options.error());
+    const Status opened = take(openni::OpenNiDepth::make(kernel(), *options), devices.depth, devices);
+    if (!opened) return std::unexpected(opened.error());
+  }
+  if (config.panel.can_interface == "none") {
+    (void)take<NoPanel>(std::make_unique<NoPanel>(), devices.panel, devices);
+  } else {
+    (void)take<can::CanPanel>(make_panel(config), devices.panel, devices);
+  }
+  return devices;
 }
 
 Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {
@@ -157,8 +233,7 @@ Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {
   if (config.camera.device != "none" && !is_kinect(config.camera.device)) {
     const auto intrinsics = intrinsics_of(config.camera.info, config.camera.width, config.camera.height);
     if (!intrinsics) return std::unexpected(intrinsics.error());
-    checks.push_back(check_of(kColorRole, config.camera.device,
-                              v4l2::ThreadedCamera::make(kernel(), camera_options(config.camera, *intrinsics)),
+    checks.push_back(check_of(kColorRole, config.camera.device, make_v4l2(config, *intrinsics),
                               [](v4l2::ThreadedCamera& camera) { return watch_stream(camera, &camera); }));
   }
   if (config.depth.device != "none" && !is_kinect(config.depth.device)) {
@@ -168,8 +243,7 @@ Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {
                               [](openni::OpenNiDepth& camera) { return watch_stream(camera, &camera); }));
   }
   if (config.panel.can_interface != "none") {
-    checks.push_back(check_of<can::CanPanel>(kPanelRole, config.panel.can_interface,
-                                             std::make_unique<can::CanPanel>(kernel(), panel_options(config.panel)),
+    checks.push_back(check_of<can::CanPanel>(kPanelRole, config.panel.can_interface, make_panel(config),
                                              [](can::CanPanel& panel) { return watch_panel(panel, &panel); }));
   }
   return checks;

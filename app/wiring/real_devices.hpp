@@ -1,7 +1,7 @@
-/// The devices of a real cart by their drivers, as the configuration names them. A part of main.cpp, which alone
-/// includes it: like it, this file names concrete drivers.
+/// The devices of a real cart by their drivers, as the configuration names them.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,6 +19,19 @@ inline constexpr std::string_view kPanelRole = "panel";
 
 /// Whether the configuration names any.
 [[nodiscard]] bool names_real_devices(const Config& config);
+
+/// The cameras and the panel of a job; they live as long as this. Where the configuration names no panel it is one
+/// without buttons and lights.
+struct RealDevices {
+  hal::ColorCamera* color = nullptr;
+  hal::DepthCamera* depth = nullptr;
+  hal::Panel* panel = nullptr;
+  std::vector<std::shared_ptr<void>> owned;
+};
+
+/// Opens what the configuration names; it must name both cameras. Errors: those of the drivers and of a
+/// camera_info.yaml that is named, as real_device_checks.
+[[nodiscard]] Result<RealDevices> open_real_devices(const Config& config);
 
 /// A check of each device that the configuration names; one that cannot even be made says why. Errors: those of a
 /// camera_info.yaml that is named: kDataMissing, kDataMalformed, kConfigBadValue for one of another size.

@@ -1,0 +1,45 @@
+/// A UR robot on the network as the arm of a job, with the kinematics that its factory measured.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "algorithms/kinematics/arm_model.hpp"
+#include "algorithms/kinematics/near_dh.hpp"
+#include "app/config/config.hpp"
+#include "app/report/run_record.hpp"
+#include "hal/ur/network_robot.hpp"
+#include "platform/linux/terminal.hpp"
+
+namespace firstlook {
+
+class NetworkArm {
+ public:
+  /// Connects to `config.robot.host`, identifies it and says so. Errors: those of ur::NetworkRobot::connect, and
+  /// kConfigBadValue for kinematics that are not those of the configured model.
+  [[nodiscard]] static Result<std::unique_ptr<NetworkArm>> connect(const Config& config, Narrator& narrator);
+  ~NetworkArm();
+
+  [[nodiscard]] hal::RobotArm& arm() { return robot_->robot(); }
+  [[nodiscard]] hal::Pendant& pendant() { return robot_->robot().pendant(); }
+  [[nodiscard]] const ArmModel& model() const { return measured_.model; }
+
+  /// After the job: what the report tells of it, and in words what took how long.
+  [[nodiscard]] RobotRecord record(Narrator& narrator) const;
+
+ private:
+  class Notices;
+  /// The configured model with the kinematics that the robot's factory measured.
+  struct MeasuredArm {
+    ArmModel model;
+    std::optional<NearDh> near;  ///< where the measured frames lie far from the links
+  };
+  NetworkArm();
+  [[nodiscard]] static Result<MeasuredArm> measure(const ur::RobotIdentity& robot, const Config& config);
+
+  std::unique_ptr<Notices> notices_;
+  std::unique_ptr<ur::NetworkRobot> robot_;
+  MeasuredArm measured_;
+};
+
+}  // namespace firstlook

@@ -1,0 +1,54 @@
+#include "app/wiring/run_check.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "app/check/check_report.hpp"
+#include "app/check/device_check.hpp"
+#include "app/cli/exit_codes.hpp"
+#include "app/config/board_config.hpp"
+#include "app/wiring/cell_grading.hpp"
+#include "app/wiring/real_devices.hpp"
+#include "hal/sim/simulated_cell.hpp"
+#include "platform/linux/terminal.hpp"
+
+namespace firstlook {
+
+int run_check(const CheckCommand& command) {
+  auto loaded = load_config(command.sources);
+  if (!loaded) return fail(loaded.error());
+  Config config = loaded->config;
+  auto checks = real_device_checks(config);
+  if (!checks) return fail(checks.error());
+  const bool simulated = checks->empty();
+  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), true, "", config.workers,
+                                        configured_boards(config), config.depth.sensor});
+  if (!cell) return fail(cell.error());
+  sim::SimulatedCell& world = **cell;
+  if (simulated) describe_cell(world.description(), config);
+  const auto stand_in = [&](std::string_view role, std::unique_ptr<WatchedDevice> device) {
+    if (std::ranges::find(*checks, role, &DeviceCheck::role) != checks->end()) return;
+    checks->push_back({std::string(role), true, std::move(device)});
+  };
+  stand_in(kArmRole, watch_arm(world.arm(), nullptr));
+  stand_in(kColorRole, watch_stream(world.color(), nullptr));
+  stand_in(kDepthRole, watch_stream(world.depth(), nullptr));
+  stand_in(kPendantRole, watch_pendant(world.pendant(), nullptr));
+  stand_in(kPanelRole, watch_panel(world.panel(), nullptr));
+  constexpr std::string_view kOrder[] = {kArmRole, kColorRole, kDepthRole, kPendantRole, kPanelRole};
+  std::ranges::sort(*checks, {}, [&](const DeviceCheck& check) { return std::ranges::find(kOrder, check.role); });
+  std::unique_ptr<Clock> clock;
+  if (simulated) {
+    clock = std::make_unique<VirtualClock>();
+  } else {
+    clock = std::make_unique<RealClock>();
+  }
+  Narrator narrator;
+  narrator.line(simulated ? fmt::format("no device is configured: those of the simulated cell {}", config.cell)
+                          : fmt::format("what is not configured is of the simulated cell {}", config.cell));
+  CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};
+  std::fputs((command.json ? check_json(result) : check_text(result)).c_str(), stdout);
+  return result.all_ready() ? kDone : kDevice;
+}
+
+}  // namespace firstlook

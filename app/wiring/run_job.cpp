@@ -1,0 +1,140 @@
+#include "app/wiring/run_job.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "app/cli/exit_codes.hpp"
+#include "app/report/checkpoint.hpp"
+#include "app/report/result_json.hpp"
+#include "app/report/run_files.hpp"
+#include "app/shell/calibration_recording.hpp"
+#include "app/shell/cart.hpp"
+#include "app/shell/job_settings.hpp"
+#include "app/shell/narrate_result.hpp"
+#include "app/wiring/job_site.hpp"
+#include "platform/linux/process.hpp"
+#include "platform/memory/allocation_guard.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr const char* kRunsFolder = "runs";  // where runs go that name no folder
+
+/// The stored calibration for the scopes that verify one.
+Result<std::optional<StoredCalibration>> stored_calibration(RunScope scope, const Config& config) {
+  if (scope != RunScope::kMap && scope != RunScope::kVerify) return std::optional<StoredCalibration>();
+  if (config.calibration.stored == "none") {
+    return failure(Fault::kUsage,
+                   "--only {} needs a stored calibration: --calibration FILE, the hand_eye.yaml of a run (`firstlook "
+                   "run --only calibrate --out DIR` makes one), or calibration.stored in the configuration",
+                   name_of(scope));
+  }
+  auto read = read_hand_eye(config.calibration.stored);
+  if (!read) return std::unexpected(read.error());
+  return std::optional(*read);
+}
+
+/// With --resume: the run that a power cut ended between its calibration and its end, if there is one.
+std::optional<CutOffRun> run_to_resume(const RunCommand& command, Narrator& narrator) {
+  if (!command.resume || command.scope != RunScope::kEverything) return std::nullopt;
+  std::optional<CutOffRun> cut_off = newest_cut_off_run(kRunsFolder);
+  if (cut_off) {
+    narrator.line(
+        fmt::format("{} was cut off after its calibration: Play tests that calibration and maps", cut_off->folder));
+  }
+  return cut_off;
+}
+
+/// The cart, and what its memory took at boot.
+struct Booted {
+  std::unique_ptr<Cart> cart;
+  std::int64_t heap_bytes = 0;
+};
+
+Result<Booted> boot(const Config& config, const CartOptions& options, const CellFacts& facts, JobSite& site,
+                    Narrator& narrator) {
+  const memory::JobHeapScope heap(memory::kHeapUncapped);
+  auto made = Cart::make(config, options, facts, site.devices(), narrator);
+  if (!made) return std::unexpected(made.error());
+  return Booted{std::move(*made), heap.outstanding_bytes()};
+}
+
+/// All files of the run; behind them its checkpoint is of no use any more.
+Status write_run(const RunCommand& command, const Config& config, const std::string& folder, const Cart& cart,
+                 const RunRecord& record) {
+  if (command.record) {
+    if (const Status written = write_calibration_recording(folder + "/dataset", record, config); !written)
+      return written;
+  }
+  if (const Status written = write_run_files(folder, record, cart.map_files()); !written) return written;
+  remove_checkpoint(folder);
+  return {};
+}
+
+std::string where(const RunCommand& command, const LoadedConfig& loaded) {
+  const Config& config = loaded.config;
+  if (names_real_cart(config)) return fmt::format("running on the robot at {}", config.robot.host);
+  const bool configured = command.cell_given || !loaded.file.empty();
+  return fmt::format("{}running in the simulated cell {}", configured ? "" : "no configuration: ", config.cell);
+}
+
+}  // namespace
+
+int run_job(const RunCommand& command) {
+  const auto loaded = load_config(command.sources);
+  if (!loaded) return fail(loaded.error());
+  Config config = loaded->config;
+  Narrator narrator;
+  narrator.line(where(command, *loaded));
+  auto stored = stored_calibration(command.scope, config);
+  if (!stored) return fail(stored.error());
+  std::optional<CutOffRun> resumed = run_to_resume(command, narrator);
+  if (resumed) *stored = resumed->calibration;
+  const std::string folder =
+      command.out.empty() ? fmt::format("{}/{}-{}", kRunsFolder, utc_date_for_name(), config.seed) : command.out;
+  if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
+
+  auto opened = names_real_cart(config) ? open_real_site(command, config, narrator)
+                                        : open_simulated_site(command, config, narrator);
+  if (!opened) return fail(opened.error());
+  JobSite& site = **opened;
+  if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
+  CellFacts facts = site.facts();
+  facts.stored = *stored;
+  CartOptions options;
+  options.scope = resumed ? RunScope::kMap : command.scope;
+  options.real_time = command.real_time || site.in_real_time();
+  options.journal_path = folder + "/journal.flj";
+  auto booted = boot(config, options, facts, site, narrator);
+  if (!booted && resumed && booted.error().fault == Fault::kStoredCalibration) {
+    narrator.line(fmt::format("not taken up: {}", describe(booted.error())), Priority::kWarning);
+    remove_checkpoint(resumed->folder);
+    resumed.reset();
+    facts.stored.reset();
+    options.scope = command.scope;
+    booted = boot(config, options, facts, site, narrator);
+  }
+  if (!booted) return fail(booted.error());
+  Cart& cart = *booted->cart;
+
+  site.begin(cart.published());
+  catch_stop_signals();
+  const Status ran = cart.run();
+  if (!ran) std::fprintf(stderr, "firstlook: %s\n", describe(ran.error()).c_str());
+
+  RunRecord record = cart.record();
+  site.finish(cart, config, record, narrator);
+  record.wall.boot_heap_bytes = static_cast<std::uint64_t>(std::max<std::int64_t>(0, booted->heap_bytes));
+  record.provenance.sensor = command.fast_sensor ? "fast" : "full";
+  record.wall.folder = folder;
+  narrate_result(record, narrator);
+  if (const Status written = write_run(command, config, folder, cart, record); !written) return fail(written.error());
+  // Taken up and brought to its end; one that was stopped is offered again.
+  if (resumed && record.outcome != Outcome::kSafelyStopped) remove_checkpoint(resumed->folder);
+  narrator.line(fmt::format("report    {}/report.html", folder));
+  if (command.json) std::printf("%s", result_json(record).c_str());
+  return ran ? exit_code_of(cart.ending()) : exit_code_of(ran.error());
+}
+
+}  // namespace firstlook
