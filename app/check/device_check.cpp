@@ -107,7 +107,9 @@ class WatchedArm final : public WatchedDevice {
     if (report.state == DeviceState::kReady && states_ == 0) {
       fall_silent(report, "no report of its joints came", "Check the network cable and that the controller is on.");
     } else if (report.state == DeviceState::kReady) {
-      report.detail.set("{:.1f} reports a second, {}", rate_hz, safety_text(last_.safety));
+      const auto told = report.detail;
+      report.detail.set("{}{}{:.1f} reports a second, {}", told.view(), told.empty() ? "" : "; ", rate_hz,
+                        safety_text(last_.safety));
       if (last_.safety != hal::ArmSafety::kNormal && last_.safety != hal::ArmSafety::kReduced) {
         report.state = DeviceState::kUnsuitable;
         report.remedy.set("Find the cause, and clear it at the pendant.");

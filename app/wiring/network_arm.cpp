@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "hal/ur/modes.hpp"
+
 namespace firstlook {
 
 /// What the robot's side has to say, among the lines of the job.
@@ -34,6 +36,7 @@ Result<std::unique_ptr<NetworkArm>> NetworkArm::connect(const Config& config, Na
   options.own_address = config.robot.own_address;
   options.arm = config.arm.model;
   options.payload_kg = config.robot.payload_kg;
+  arm->host_ = config.robot.host;
   auto connected = ur::NetworkRobot::connect(options, arm->notices_.get());
   if (!connected) return std::unexpected(connected.error());
   arm->robot_ = std::move(*connected);
@@ -74,6 +77,28 @@ Result<NetworkArm::MeasuredArm> NetworkArm::measure(const ur::RobotIdentity& rob
         config.robot.host, arm.model.name, 1e3 * arm.near->worst_m, 1e3 * arm.near->worst_rad);
   }
   return arm;
+}
+
+hal::DeviceReport NetworkArm::report(Instant) const {
+  const ur::RobotIdentity& robot = robot_->identity();
+  const ur::RtdeClient& rtde = robot_->robot().rtde();
+  hal::DeviceReport report;
+  report.state = rtde.streaming() ? hal::DeviceState::kReady : hal::DeviceState::kStarting;
+  report.device.set("{} at {}", robot.arm_name(), host_);
+  report.detail.set("software {}.{}.{}, serial number {}, factory kinematics {:08x}, {}", robot.version.major,
+                    robot.version.minor, robot.version.bugfix, robot.serial_number(), robot.kinematics.checksums[0],
+                    ur::robot_mode_name(robot.robot_mode));
+  if (robot.robot_mode != ur::kRobotModeRunning) {
+    report.state = hal::DeviceState::kUnsuitable;
+    report.remedy.set("Switch the robot on at the pendant and release its brakes: firstlook never does that.");
+  } else if (rtde.trouble()) {
+    report.state = hal::DeviceState::kLost;
+    report.detail.set("{}", rtde.trouble()->detail());
+    report.remedy.set("Check the cable, and that RTDE is enabled (Settings, Security, Services).");
+  }
+  report.add("connections", static_cast<double>(rtde.counters().connections));
+  report.add("broken_streams", static_cast<double>(rtde.counters().broken));
+  return report;
 }
 
 RobotRecord NetworkArm::record(Narrator& narrator) const {

@@ -3,27 +3,31 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/kinematics/near_dh.hpp"
 #include "app/config/config.hpp"
 #include "app/report/run_record.hpp"
+#include "hal/api/device_report.hpp"
 #include "hal/ur/network_robot.hpp"
 #include "platform/linux/terminal.hpp"
 
 namespace firstlook {
 
-class NetworkArm {
+class NetworkArm final : public hal::ReportingDevice {
  public:
   /// Connects to `config.robot.host`, identifies it and says so. Errors: those of ur::NetworkRobot::connect, and
   /// kConfigBadValue for kinematics that are not those of the configured model.
   [[nodiscard]] static Result<std::unique_ptr<NetworkArm>> connect(const Config& config, Narrator& narrator);
-  ~NetworkArm();
+  ~NetworkArm() override;
 
   [[nodiscard]] hal::RobotArm& arm() { return robot_->robot(); }
   [[nodiscard]] hal::Pendant& pendant() { return robot_->robot().pendant(); }
   [[nodiscard]] const ArmModel& model() const { return measured_.model; }
 
+  /// Which robot it is, and what keeps it from moving.
+  [[nodiscard]] hal::DeviceReport report(Instant now) const override;
   /// After the job: what the report tells of it, and in words what took how long.
   [[nodiscard]] RobotRecord record(Narrator& narrator) const;
 
@@ -40,6 +44,7 @@ class NetworkArm {
   std::unique_ptr<Notices> notices_;
   std::unique_ptr<ur::NetworkRobot> robot_;
   MeasuredArm measured_;
+  std::string host_;
 };
 
 }  // namespace firstlook

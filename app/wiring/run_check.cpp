@@ -8,18 +8,40 @@
 #include "app/cli/exit_codes.hpp"
 #include "app/config/board_config.hpp"
 #include "app/wiring/cell_grading.hpp"
+#include "app/wiring/network_arm.hpp"
 #include "app/wiring/real_devices.hpp"
 #include "hal/sim/simulated_cell.hpp"
 #include "platform/linux/terminal.hpp"
 
 namespace firstlook {
 
+namespace {
+
+/// The robot as arm and pendant among the checks; it must outlive them. Null when it cannot be had: a check says why.
+std::unique_ptr<NetworkArm> check_robot(const Config& config, Narrator& narrator, std::vector<DeviceCheck>& checks) {
+  auto connected = NetworkArm::connect(config, narrator);
+  if (!connected) {
+    checks.push_back({std::string(kArmRole), false, absent_device(config.robot.host, connected.error())});
+    checks.push_back({std::string(kPendantRole), false, absent_device(config.robot.host, connected.error())});
+    return nullptr;
+  }
+  NetworkArm& arm = **connected;
+  checks.push_back({std::string(kArmRole), false, watch_arm(arm.arm(), &arm)});
+  checks.push_back({std::string(kPendantRole), false, watch_pendant(arm.pendant(), nullptr)});
+  return std::move(*connected);
+}
+
+}  // namespace
+
 int run_check(const CheckCommand& command) {
   auto loaded = load_config(command.sources);
   if (!loaded) return fail(loaded.error());
   Config config = loaded->config;
+  Narrator narrator;
+  std::unique_ptr<NetworkArm> robot;
   auto checks = real_device_checks(config);
   if (!checks) return fail(checks.error());
+  if (config.robot.given()) robot = check_robot(config, narrator, *checks);
   const bool simulated = checks->empty();
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), true, "", config.workers,
                                         configured_boards(config), config.depth.sensor});
@@ -43,7 +65,6 @@ int run_check(const CheckCommand& command) {
   } else {
     clock = std::make_unique<RealClock>();
   }
-  Narrator narrator;
   narrator.line(simulated ? fmt::format("no device is configured: those of the simulated cell {}", config.cell)
                           : fmt::format("what is not configured is of the simulated cell {}", config.cell));
   CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};

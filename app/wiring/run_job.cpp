@@ -74,7 +74,7 @@ Status write_run(const RunCommand& command, const Config& config, const std::str
 
 std::string where(const RunCommand& command, const LoadedConfig& loaded) {
   const Config& config = loaded.config;
-  if (names_real_cart(config)) return fmt::format("running on the robot at {}", config.robot.host);
+  if (names_real_cart(config)) return fmt::format("running on the real cart, robot {}", config.robot.host);
   const bool configured = command.cell_given || !loaded.file.empty();
   return fmt::format("{}running in the simulated cell {}", configured ? "" : "no configuration: ", config.cell);
 }
