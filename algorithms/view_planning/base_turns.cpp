@@ -7,6 +7,9 @@ namespace firstlook {
 namespace {
 
 constexpr double kFullTurn_rad = 2 * std::numbers::pi;
+// Of a joint that tilts the view, before one further out is passed over for it: parallel joints of an arm that was
+// measured differ by some thousandths.
+constexpr double kBetter = 0.02;
 
 /// The base angles of one round, in order.
 struct Window {
@@ -43,7 +46,7 @@ TiltJoint tilt_joint(const ArmModel& arm, const JointVector& q_rad) {
     // straight up or down has no upwards, but then any level axis across it serves.
     const Eigen::Vector3d tip = axis.cross(view);
     const double score = tip.norm() * std::sqrt(std::max(0.0, 1 - axis.z() * axis.z()));
-    if (score > best_score + 1e-6) {
+    if (score > best_score + kBetter) {
       best_score = score;
       best = {.joint = joint, .up_sign = tip.z() < -1e-9 ? -1.0 : 1.0};
     }

@@ -113,9 +113,12 @@ void UrRobot::hear_program(Instant now) {
         break;
       case ReportKind::kStopped:
         if (report->number != stop_number_) break;
+        // One that was sent in a pause waited for the program to go on: that is no delay.
+        if (flight_ == Flight::kStopping && !withdrawn_) {
+          delays_.stop_s = std::max(delays_.stop_s, (now - sent_).seconds());
+        }
         withdrawn_ = false;
         if (flight_ != Flight::kStopping) break;
-        delays_.stop_s = std::max(delays_.stop_s, (now - sent_).seconds());
         flight_ = Flight::kArriving;
         standing_reports_ = 0;
         break;

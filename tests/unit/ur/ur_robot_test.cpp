@@ -118,6 +118,7 @@ TEST_CASE("a pause withdraws the segment; after it nothing moves until it is ask
   CHECK(arm.network.unread_by_program() < 400);  // nothing piles up in its socket
   arm.play();
   CHECK(playing.turned(1) < kFirstCycle_rad);
+  CHECK(arm.robot.delays().stop_s == 0);  // a pause is none
   CHECK(arm.last.program_running);
   CHECK_FALSE(arm.last.moving);
   CHECK(arm.keys.back() == OperatorAction::kPlay);

@@ -64,3 +64,12 @@ TEST_CASE("the tilt joint raises the view by its sign", "[base_turns]") {
 TEST_CASE("more views than fit are cut", "[base_turns]") {
   REQUIRE(base_turns(kUr5, default_start(kUr5), 0.2, std::array{0.0, 0.1, 0.2, 0.3}).size() == kTurnsMax);
 }
+
+TEST_CASE("the outermost of parallel joints tilts an arm that was measured, too", "[base_turns]") {
+  ArmModel measured = kUr5;
+  for (std::size_t j = 0; j < 6; ++j) {
+    measured.dh[j].alpha_rad += (j % 2 == 0 ? 4e-4 : -7e-4);
+    measured.dh[j].theta_offset_rad += 5e-4;
+  }
+  REQUIRE(tilt_joint(measured, default_start(measured)).joint == 3);
+}
