@@ -5,34 +5,11 @@
 namespace firstlook::can {
 namespace {
 
-// Objects of CiA 301.
-constexpr ObjectAddress kDeviceType{0x1000, 0};
-constexpr ObjectAddress kConsumerHeartbeat{0x1016, 1};
-constexpr ObjectAddress kProducerHeartbeat{0x1017, 0};
-constexpr ObjectAddress kVendor{0x1018, 1};
-constexpr ObjectAddress kProduct{0x1018, 2};
-constexpr std::uint16_t kReceivePdoParameters = 0x1400;
-constexpr std::uint16_t kReceivePdoMapping = 0x1600;
-constexpr std::uint16_t kTransmitPdoParameters = 0x1800;
-constexpr std::uint16_t kTransmitPdoMapping = 0x1A00;
-constexpr std::uint32_t kPdoOff = 0x80000000;
-constexpr std::uint32_t kPdoNoRemote = 0x40000000;  // nobody may ask for it
-constexpr std::uint32_t kPdoOnChange = 255;         // transmission type: event driven, by the device profile
-constexpr std::uint32_t kPdoAtLeastEvery_ms = 250;  // event timer: a lost frame is made good
-
-// Objects of CiA 401.
 constexpr std::uint32_t kProfile = 401;
 constexpr std::uint32_t kProfileMask = 0xFFFF;
-constexpr std::uint16_t kInputs = 0x6000;
-constexpr ObjectAddress kInputInterrupt{0x6005, 0};
-constexpr std::uint16_t kOutputs = 0x6200;
-constexpr std::uint16_t kOutputErrorMode = 0x6206;
-constexpr std::uint16_t kOutputErrorValue = 0x6207;
-
 constexpr std::size_t kFramesPerTurn = 64;
 constexpr Duration kOutputsRefresh = milliseconds(1000);
 constexpr Duration kRefusedRetry = milliseconds(5000);
-constexpr std::uint32_t kWatchUs_ms = 500;  // five of our heartbeats
 
 }  // namespace
 
@@ -43,49 +20,8 @@ RemoteIo::RemoteIo(SystemCalls& system, const RemoteIoOptions& options)
                 {kSdoAnswerId + options.node, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG},
                 // Heartbeats of all nodes: one with another number than expected is worth telling.
                 {kHeartbeatId, 0x780 | CAN_EFF_FLAG | CAN_RTR_FLAG}}},
-      socket_(system, options_.interface, filters_) {
-  plan();
-}
-
-/// What is asked and written, in this order, before the node is started.
-void RemoteIo::plan() {
-  using Kind = Setup::Kind;
-  setups_.push_back({Kind::kRead, kDeviceType, 0, 4});
-  setups_.push_back({Kind::kRead, kVendor, 0, 4});
-  setups_.push_back({Kind::kRead, kProduct, 0, 4});
-  const auto period_ms = static_cast<std::uint32_t>(options_.heartbeat.ns / 1'000'000);
-  setups_.push_back({Kind::kWrite, kProducerHeartbeat, period_ms, 2});
-  setups_.push_back({Kind::kTryWrite, kConsumerHeartbeat, std::uint32_t{options_.master} << 16 | kWatchUs_ms, 4});
-  for (std::uint8_t i = 0; i < options_.output_bytes; ++i) {
-    const auto sub = static_cast<std::uint8_t>(i + 1);
-    setups_.push_back({Kind::kTryWrite, {kOutputErrorMode, sub}, 0xFF, 1});
-    const auto value = static_cast<std::uint32_t>(options_.fault_outputs >> (8 * i)) & 0xFF;
-    setups_.push_back({Kind::kTryWrite, {kOutputErrorValue, sub}, value, 1});
-  }
-  plan_pdo(kTransmitPdoParameters, kTransmitPdoMapping, kTransmitPdo1Id, kInputs, options_.input_bytes);
-  plan_pdo(kReceivePdoParameters, kReceivePdoMapping, kReceivePdo1Id, kOutputs, options_.output_bytes);
-  setups_.push_back({Kind::kTryWrite, kInputInterrupt, 1, 1});
-}
-
-/// A PDO is mapped while it is off (CiA 301, 7.5.2.36). A node whose mapping is fixed refuses that; what counts is that
-/// the mapping is the one we need, which is read back.
-void RemoteIo::plan_pdo(std::uint16_t parameters, std::uint16_t mapping, std::uint32_t function, std::uint16_t object,
-                        std::uint8_t bytes) {
-  using Kind = Setup::Kind;
-  const std::uint32_t id = kPdoNoRemote | (function + options_.node);
-  setups_.push_back({Kind::kTryWrite, {parameters, 1}, kPdoOff | id, 4});
-  setups_.push_back({Kind::kTryWrite, {parameters, 2}, kPdoOnChange, 1});
-  if (parameters == kTransmitPdoParameters) {
-    setups_.push_back({Kind::kTryWrite, {parameters, 5}, kPdoAtLeastEvery_ms, 2});
-  }
-  setups_.push_back({Kind::kTryWrite, {mapping, 0}, 0, 1});
-  const auto entry = [&](std::uint8_t i) { return std::uint32_t{object} << 16 | (i + 1U) << 8 | 8U; };
-  const auto sub = [](std::uint8_t i) { return static_cast<std::uint8_t>(i + 1); };
-  for (std::uint8_t i = 0; i < bytes; ++i) setups_.push_back({Kind::kTryWrite, {mapping, sub(i)}, entry(i), 4});
-  setups_.push_back({Kind::kTryWrite, {mapping, 0}, bytes, 1});
-  for (std::uint8_t i = 0; i < bytes; ++i) setups_.push_back({Kind::kExpect, {mapping, sub(i)}, entry(i), 4});
-  setups_.push_back({Kind::kWrite, {parameters, 1}, id, 4});
-}
+      socket_(system, options_.interface, filters_),
+      setups_(node_setup(options)) {}
 
 bool RemoteIo::send(const can_frame& frame, Instant now) {
   switch (socket_.send(frame)) {
@@ -153,8 +89,8 @@ void RemoteIo::configure(Instant now) {
 
 void RemoteIo::ask(Instant now) {
   due_ = now + options_.sdo_timeout;
-  const Setup& setup = setups_[setup_];
-  const bool reads = setup.kind == Setup::Kind::kRead || setup.kind == Setup::Kind::kExpect;
+  const SetupStep& setup = setups_[setup_];
+  const bool reads = setup.kind == SetupStep::Kind::kRead || setup.kind == SetupStep::Kind::kExpect;
   // A frame that finds no room is asked again when its time is over.
   (void)send(reads ? sdo_upload_request(options_.node, setup.address)
                    : sdo_download_request(options_.node, setup.address, setup.value, setup.size),
@@ -163,7 +99,7 @@ void RemoteIo::ask(Instant now) {
 
 void RemoteIo::ask_inputs(Instant now) {
   due_ = now + options_.sdo_timeout;
-  (void)send(sdo_upload_request(options_.node, {kInputs, input_sub_}), now);
+  (void)send(sdo_upload_request(options_.node, {kInputsObject, input_sub_}), now);
 }
 
 void RemoteIo::next_setup(Instant now) {
@@ -304,7 +240,7 @@ void RemoteIo::handle_heartbeat(const Heartbeat& heartbeat, Instant now) {
 void RemoteIo::handle_answer(const SdoAnswer& answer, Instant now) {
   if (answer.kind == SdoAnswer::Kind::kAborted) ++counters_.sdo_aborts;
   if (step_ == NodeStep::kStarting) {
-    if (answer.kind != SdoAnswer::Kind::kUploaded || answer.address != ObjectAddress{kInputs, input_sub_}) return;
+    if (answer.kind != SdoAnswer::Kind::kUploaded || answer.address != ObjectAddress{kInputsObject, input_sub_}) return;
     input_bits_ |= std::uint64_t{answer.value & 0xFF} << (8 * (input_sub_ - 1));
     if (input_sub_ == options_.input_bytes) {
       become_operational(now, input_bits_);
@@ -315,9 +251,9 @@ void RemoteIo::handle_answer(const SdoAnswer& answer, Instant now) {
     return;
   }
   if (step_ != NodeStep::kConfiguring) return;
-  const Setup& setup = setups_[setup_];
+  const SetupStep& setup = setups_[setup_];
   if (answer.address != setup.address) return;  // late, to a question before
-  const bool reads = setup.kind == Setup::Kind::kRead || setup.kind == Setup::Kind::kExpect;
+  const bool reads = setup.kind == SetupStep::Kind::kRead || setup.kind == SetupStep::Kind::kExpect;
   switch (answer.kind) {
     case SdoAnswer::Kind::kUploaded:
       if (reads) handle_read(setup, answer.value, now);
@@ -330,9 +266,9 @@ void RemoteIo::handle_answer(const SdoAnswer& answer, Instant now) {
       refuse(now, {Refusal::Kind::kAborted, setup.address, kAbortTimedOut, 0});
       break;
     case SdoAnswer::Kind::kAborted:
-      if (setup.address == kConsumerHeartbeat) watches_us_ = false;
+      if (setup.address == kConsumerHeartbeatObject) watches_us_ = false;
       // The product code is not mandatory (CiA 301, 7.5.2.18): its absence matters only where one is expected.
-      if (setup.kind == Setup::Kind::kTryWrite || (setup.address == kProduct && options_.product == 0)) {
+      if (setup.kind == SetupStep::Kind::kTryWrite || (setup.address == kProductObject && options_.product == 0)) {
         next_setup(now);
       } else {
         refuse(now, {Refusal::Kind::kAborted, setup.address, answer.value, 0});
@@ -341,8 +277,8 @@ void RemoteIo::handle_answer(const SdoAnswer& answer, Instant now) {
   }
 }
 
-void RemoteIo::handle_read(const Setup& setup, std::uint32_t value, Instant now) {
-  if (setup.kind == Setup::Kind::kExpect) {
+void RemoteIo::handle_read(const SetupStep& setup, std::uint32_t value, Instant now) {
+  if (setup.kind == SetupStep::Kind::kExpect) {
     if (value == setup.value) {
       next_setup(now);
     } else {
@@ -350,18 +286,18 @@ void RemoteIo::handle_read(const Setup& setup, std::uint32_t value, Instant now)
     }
     return;
   }
-  if (setup.address == kDeviceType && (value & kProfileMask) != kProfile) {
+  if (setup.address == kDeviceTypeObject && (value & kProfileMask) != kProfile) {
     refuse(now, {Refusal::Kind::kDeviceType, setup.address, value, kProfile});
     return;
   }
-  if (setup.address == kVendor) {
+  if (setup.address == kVendorObject) {
     vendor_ = value;
     if (options_.vendor != 0 && value != options_.vendor) {
       refuse(now, {Refusal::Kind::kVendor, setup.address, value, options_.vendor});
       return;
     }
   }
-  if (setup.address == kProduct) {
+  if (setup.address == kProductObject) {
     product_ = value;
     if (options_.product != 0 && value != options_.product) {
       refuse(now, {Refusal::Kind::kProduct, setup.address, value, options_.product});

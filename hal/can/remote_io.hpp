@@ -4,31 +4,15 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 #include <utility>
 
 #include "hal/can/can_socket.hpp"
 #include "hal/can/canopen.hpp"
+#include "hal/can/node_setup.hpp"
 #include "platform/core/fixed_vector.hpp"
 #include "platform/core/time.hpp"
 
 namespace firstlook::can {
-
-struct RemoteIoOptions {
-  std::string interface = "can0";
-  std::uint8_t node = 10;
-  std::uint8_t master = 127;        ///< our own number: our heartbeat is sent under it
-  std::uint8_t input_bytes = 1;     ///< 1 to 8
-  std::uint8_t output_bytes = 1;    ///< 1 to 8
-  std::uint32_t vendor = 0;         ///< of object 1018h; 0: any
-  std::uint32_t product = 0;        ///< of object 1018h; 0: any
-  std::uint64_t fault_outputs = 0;  ///< what the node shows by itself when it does not hear us any more
-  Duration heartbeat = milliseconds(100);
-  Duration heartbeat_timeout = milliseconds(350);  ///< 3.5 periods: three lost frames in a row
-  Duration boot_timeout = milliseconds(2000);      ///< from reset to the boot-up message; then reset again
-  Duration sdo_timeout = milliseconds(500);        ///< of one answer; asked twice
-  Duration reopen = milliseconds(1000);            ///< between two tries on an interface that is not there
-};
 
 /// Where the node is on its way. kOperational alone means that inputs and outputs can be relied on.
 enum class NodeStep : std::uint8_t {
@@ -71,15 +55,6 @@ struct InputReport {
   bool first = false;  ///< since the node became operational: a state, not a change
 };
 
-/// One entry that is read or written on the way to operational.
-struct Setup {
-  enum class Kind : std::uint8_t { kRead, kExpect, kWrite, kTryWrite };
-  Kind kind = Kind::kRead;
-  ObjectAddress address;
-  std::uint32_t value = 0;
-  std::uint8_t size = 0;
-};
-
 /// Loop thread. Nothing blocks or allocates after construction.
 class RemoteIo {
  public:
@@ -115,9 +90,6 @@ class RemoteIo {
   [[nodiscard]] Instant last_heard() const { return heard_; }
 
  private:
-  void plan();
-  void plan_pdo(std::uint16_t parameters, std::uint16_t mapping, std::uint32_t function, std::uint16_t object,
-                std::uint8_t bytes);
   void open(Instant now);
   void reset(Instant now);
   void configure(Instant now);
@@ -133,7 +105,7 @@ class RemoteIo {
   void handle_error(const BusError& error, Instant now);
   void handle_heartbeat(const Heartbeat& heartbeat, Instant now);
   void handle_answer(const SdoAnswer& answer, Instant now);
-  void handle_read(const Setup& setup, std::uint32_t value, Instant now);
+  void handle_read(const SetupStep& setup, std::uint32_t value, Instant now);
   void keep_times(Instant now);
   void bus_lost(Instant now);
   bool send(const can_frame& frame, Instant now);
@@ -141,7 +113,7 @@ class RemoteIo {
   RemoteIoOptions options_;
   std::array<can_filter, 4> filters_;
   CanSocket socket_;
-  FixedVector<Setup, 80> setups_;
+  NodeSetup setups_;
   std::size_t setup_ = 0;
   bool asked_again_ = false;
   NodeStep step_ = NodeStep::kNoBus;

@@ -274,7 +274,7 @@ hal::DeviceReport Kinect::report(const KinectStream& stream) const {
   const hal::StreamCounters counters = stream.counters();
   const std::scoped_lock lock(mutex_);
   hal::DeviceReport report;
-  report.device.set("Kinect {}", options_.usb.serial);
+  report.device.set("Kinect{}{}", options_.usb.serial.empty() ? "" : " ", options_.usb.serial);
   const DeviceState gone = counters.frames > 0 ? DeviceState::kLost : DeviceState::kMissing;
   switch (phase_) {
     case Phase::kStarting:
