@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "app/cli/cli.hpp"
+#include "app/config/arm_file.hpp"
 #include "app/config/board_config.hpp"
 #include "app/machine/state_table.hpp"
 #include "app/report/result_json.hpp"
@@ -78,9 +79,18 @@ class KnownFree final : public sim::KnownFreeView {
   const PublishedSpace& space_;
 };
 
+/// The arm of a file, and in words what was taken from it.
+Result<ArmModel> read_arm(const std::string& path, const Config::Arm& config, Narrator& narrator) {
+  const auto read = read_arm_file(path, arm_file_options(config));
+  if (!read) return std::unexpected(read.error());
+  narrator.line("arm       " + read->summary);
+  return read->arm;
+}
+
 /// The configuration of a simulated cell: what its integrator would have typed in.
 void describe_cell(const sim::CellDescription& cell, Config& config) {
-  config.arm.model = cell.arm_model;
+  if (cell.arm_file.empty()) config.arm.model = cell.arm.name.view();
+  config.arm.file = cell.arm_file.empty() ? "none" : cell.arm_file;
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
   set_targets(cell.boards, config);
@@ -88,6 +98,11 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
         {{box.low_m.x(), box.low_m.y(), box.low_m.z()}, {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
+  }
+  if (cell.camera_envelope_m > 0) config.camera_envelope_radius_m = cell.camera_envelope_m;
+  if (cell.map) {
+    config.map.low_m = {cell.map->low_m.x(), cell.map->low_m.y(), cell.map->low_m.z()};
+    config.map.high_m = {cell.map->high_m.x(), cell.map->high_m.y(), cell.map->high_m.z()};
   }
   if (!config.parking_rad) config.parking_rad = cell.start_rad;
 }
@@ -260,15 +275,18 @@ int run_job(const RunCommand& command) {
 
   std::vector<NamedTarget> boards;  // load_config has refused what is no board
   if (names_boards(config)) boards = targets_of(config).value();
+  const sim::ArmChoice arm = {config.arm.file == "none" ? "" : config.arm.file,
+                              [&](const std::string& path) { return read_arm(path, config.arm, narrator); }};
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, boards, config.depth.sensor});
+                                        command.faults, config.workers, boards, config.depth.sensor, arm});
   if (!cell) return fail(cell.error());
   sim::SimulatedCell& world = **cell;
   describe_cell(world.description(), config);
 
   if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
   const CartDevices devices{world.arm(), world.color(), world.depth(), world.pendant(), world.panel()};
-  const CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored};
+  const CellFacts facts{world.description().start_rad, world.description().camera_T_depth, *stored,
+                        world.description().arm};
   CartOptions options;
   options.scope = command.scope;
   options.real_time = command.real_time;

@@ -57,6 +57,17 @@ PlaneFitOptions plane_fit_of(const Config& config) {
 
 GroundPlane ground_of(const Config& config) { return {config.map.ground_height_m, config.map.ground_tolerance_m}; }
 
+/// Safe zone, sweep and certificates hold about axis 1 wherever it points. A level floor and what stands on it do not.
+Status check_mounting(const Config& config) {
+  if (config.arm.mounting != "tilted") return {};
+  const char* const key = config.map.ground_tolerance_m > 0 ? "map.ground_tolerance_m"
+                          : map_planes_of(config).label     ? "map.planes: label"
+                                                            : nullptr;
+  if (key == nullptr) return {};
+  return failure(Fault::kConfigBadValue,
+                 "{} needs z of the arm's base to point up, which arm.mounting: tilted says it does not", key);
+}
+
 ClearanceInputs clearance_inputs(const Config& config) {
   ClearanceInputs in;
   in.voxel_m = config.map.resolution_m;
@@ -74,8 +85,9 @@ ClearanceInputs clearance_inputs(const Config& config) {
 Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const CellFacts& facts,
                                                    hal::ColorCamera& color, hal::DepthCamera& depth,
                                                    WorkerPool& workers) {
-  const auto arm = find_arm_model(config.arm.model);
+  const auto arm = facts.arm ? facts.arm : find_arm_model(config.arm.model);
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
+  if (const Status stands = check_mounting(config); !stands) return std::unexpected(stands.error());
   if (facts.stored) {
     const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth,
                                       config.calibration.intrinsics == "estimate");

@@ -45,6 +45,7 @@ struct CellFacts {
   JointVector start_rad;                    ///< where the sweep turns around, and where the job parks
   Transform<Camera, Depth> camera_T_depth;  ///< as its maker states it
   std::optional<StoredCalibration> stored;  ///< of an earlier job; for scopes that verify it
+  std::optional<ArmModel> arm = {};         ///< empty: the built-in one that the configuration names
 };
 
 /// A target as it was seen from one stop of the calibration. Those of one stop have the same number of it, their

@@ -19,6 +19,7 @@ StoredCalibration stored_form(const RunRecord& record) {
     return c;
   }
   StoredCalibration c = stored_calibration(*record.hand_eye, record.solver, record.provenance.arm_model);
+  if (record.provenance.kinematics != 0) c.kinematics = record.provenance.kinematics;
   c.intrinsics = record.intrinsics;
   if (!record.alignment) return c;
   const DepthCameraRecord& depth = record.alignment->depth_camera;

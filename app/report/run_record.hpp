@@ -267,8 +267,9 @@ struct FaultRecord {
 struct Provenance {
   std::string version;
   std::string arm_model;
-  std::string sensor;       ///< "full" or "fast"
-  std::string config_yaml;  ///< print_config of what the run used
+  std::uint64_t kinematics = 0;  ///< kinematics_checksum of the arm
+  std::string sensor;            ///< "full" or "fast"
+  std::string config_yaml;       ///< print_config of what the run used
   std::string journal_hash;
 };
 

@@ -340,7 +340,8 @@ RunRecord Cart::record() const {
   for (const MotionStop& stop : stops_) r.faults.push_back({stop.time.seconds(), stop.cause, ""});
   r.memory = memory_record();
   r.provenance.version = version_text();
-  r.provenance.arm_model = config_.arm.model;
+  r.provenance.arm_model = bench_->arm().name.view();
+  r.provenance.kinematics = kinematics_checksum(bench_->arm());
   r.provenance.config_yaml = print_config(config_);
   r.wall = wall_record();
   r.reason = reason_text(r, ending_);
