@@ -137,9 +137,10 @@ floor_m: -0.95
 walls: {low_m: [-2.0, -2.1], high_m: [2.2, 2.0], height_m: 2.6}
 cart: {low_m: [-0.45, -0.25], high_m: [0.25, 0.55], top_m: -0.42}
 safe_zone: {radius_m: 0.72, height_m: 1.15}
-board: {center_m: [1.05, -0.55, 0.25], faces: [-1, 0.5, 0.1]}
+map: {low_m: [-1.5, -1.5, -0.5], high_m: [1.5, 1.5, 1.3]}
+board: {center_m: [0.88, -0.74, 0.50], faces: [-0.88, 0.74, -0.05]}
 solids:
-  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.10}, position_m: [1.11, -0.58, -0.40]}
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.35}, position_m: [0.94, -0.79, -0.275]}
   - {name: table, box: {size_m: [0.60, 1.20, 0.04]}, position_m: [1.15, 0.10, -0.30], color: [0.55, 0.42, 0.28]}
   - {name: carton, box: {size_m: [0.22, 0.30, 0.30]}, position_m: [1.10, 0.25, -0.13], rpy_deg: [0, 0, 25], color: [0.66, 0.52, 0.34]}
   - {name: shelf, box: {size_m: [0.8, 0.35, 1.5]}, position_m: [0.2, -1.35, -0.20], color: [0.50, 0.50, 0.54]}

@@ -1,0 +1,22 @@
+/// Jobs with arms that are no UR: as many joints as it takes, from a file or built in.
+#include "tests/support/job_run.hpp"
+
+namespace firstlook {
+using test::JobFolder;
+using test::Json;
+
+TEST_CASE("an arm with seven joints beside a torso calibrates and maps, touching nothing", "[scenario]") {
+  const JobFolder folder;
+  const auto run = folder.run({"run", "--cell", "pr2_like", "--seed", "1", "--sensor", "fast", "--out", "out"});
+  INFO(run.err);
+  CHECK(run.exit_code == 0);
+  const Json result = folder.read_json("out/result.json");
+  CHECK(result["outcome"] == "done");
+  CHECK(result["hand_eye"]["verdict"] == "accepted");
+  CHECK(result["truth"]["contacts"] == 0);
+  CHECK(result["truth"]["unknown_entries"] == 0);
+  CHECK(result["truth"]["coverage_of_observable"] > 0.9);
+  CHECK(folder.run({"replay", "out/journal.flj"}).exit_code == 0);
+}
+
+}  // namespace firstlook
