@@ -119,7 +119,7 @@ floor_m: -0.1
 walls: {low_m: [-2.6, -2.8], high_m: [3.2, 2.8], height_m: 3.2}
 safe_zone: {radius_m: 1.9, height_m: 2.75}
 camera_envelope_m: 0.73
-map: {low_m: [-2.0, -2.0, -0.2], high_m: [2.0, 2.0, 2.8]}
+map: {low_m: [-1.55, -1.55, 0.4], high_m: [1.55, 1.55, 2.5]}
 board: {center_m: [2.5, 0, 1.35], faces: [-1, 0, 0], inner_columns: 9, inner_rows: 6, square_size_m: 0.05}
 camera:
   position_m: [0, -0.275, -0.6]

@@ -19,4 +19,21 @@ TEST_CASE("an arm with seven joints beside a torso calibrates and maps, touching
   CHECK(folder.run({"replay", "out/journal.flj"}).exit_code == 0);
 }
 
+TEST_CASE("the thesis's two-joint arm ends safely and says what its few views leave open", "[scenario]") {
+  const JobFolder folder;
+  const auto run = folder.run({"run", "--cell", "two_joint", "--seed", "1", "--sensor", "fast", "--out", "out"});
+  INFO(run.err);
+  const Json result = folder.read_json("out/result.json");
+  CHECK(result["truth"]["contacts"] == 0);
+  CHECK(result["truth"]["unknown_entries"] == 0);
+  // The camera 600 mm behind the hand and 275 mm above it, found to some millimetres: two joints give few views.
+  const Json& t = result["hand_eye"]["translation_m"];
+  CHECK(t[1].get<double>() == Approx(-0.275).margin(0.015));
+  CHECK(t[2].get<double>() == Approx(-0.600).margin(0.015));
+  if (result["outcome"] == "done") return;
+  CHECK(run.exit_code == 5);
+  CHECK(result["outcome"] == "calibration_rejected");
+  REQUIRE_FALSE(result["hand_eye"]["reasons"].empty());
+}
+
 }  // namespace firstlook
