@@ -50,7 +50,7 @@ int run_ur_sim(const UrSimCommand& command) {
   if (!command.cell.empty()) {
     const auto scene = sim::load_cell(command.cell, command.seed);
     if (!scene) return fail(scene.error());
-    model = scene->arm_model;
+    model = scene->arm.name.view();
     options.start_rad = scene->start_rad;
   }
   const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "algorithms/kinematics/other_arms.hpp"
 #include "platform/core/ensure.hpp"
 
 namespace firstlook {
@@ -193,11 +194,23 @@ void cos_sin(double angle_rad, double& c, double& s) {
   }
 }
 
+/// Ry(beta) Rz(gamma), for rows that have them.
+template <typename Columns>
+void turn_further(const DhRow& row, Columns& to) {
+  const double cb = std::cos(row.beta_rad), sb = std::sin(row.beta_rad);
+  const double cg = std::cos(row.gamma_rad), sg = std::sin(row.gamma_rad);
+  const Eigen::Vector3d x = to.col(0) * cb - to.col(2) * sb;
+  const Eigen::Vector3d y = to.col(1);
+  to.col(2) = Eigen::Vector3d(to.col(2) * cb + to.col(0) * sb);
+  to.col(0) = x * cg + y * sg;
+  to.col(1) = y * cg - x * sg;
+}
+
 }  // namespace
 
 std::optional<ArmModel> find_arm_model(std::string_view name) {
   const UrSize* s = find_size(name);
-  if (s == nullptr) return std::nullopt;
+  if (s == nullptr) return find_other_arm(name);
   ArmModel arm;
   arm.name = s->name;
   arm.joints = 6;
@@ -209,20 +222,27 @@ std::optional<ArmModel> find_arm_model(std::string_view name) {
     arm.upper_rad[j] = range;
     arm.speed_max_rad_s[j] = (j < 2 ? s->base_speed_deg_s : 180) * kPi / 180;
   }
-  arm.acceleration_max_rad_s2 = 120 * kPi / 180;  // not published; mild for every model
+  arm.acceleration_max_rad_s2 = kUsualAcceleration_rad_s2;
   arm.body = body_of(*s);
   return arm;
 }
 
 Capsules true_body(const ArmModel& arm) {
-  const UrSize* s = find_size(arm.name);
-  ENSURE(4001, s != nullptr);
-  return true_body_of(*s);
+  if (const UrSize* s = find_size(arm.name)) return true_body_of(*s);
+  Capsules body = arm.body;
+  for (Capsule& c : body) {
+    ENSURE(4001, c.radius_m > kBodyPadding_m);
+    c.radius_m -= kBodyPadding_m;
+  }
+  return body;
 }
 
 JointVector default_start(const ArmModel& arm) {
   const UrSize* s = find_size(arm.name);
-  ENSURE(4002, s != nullptr);
+  if (s == nullptr) {
+    ENSURE(4002, arm.start_rad.size() == arm.joints);
+    return arm.start_rad;
+  }
   JointVector q = JointVector::zero(6);
   for (int j = 1; j < 6; ++j) q[j] = s->start_rad[j - 1];
   return q;
@@ -231,7 +251,7 @@ JointVector default_start(const ArmModel& arm) {
 LinkFrames forward(const ArmModel& arm, const JointVector& q_rad) {
   LinkFrames frames;
   frames.joints = arm.joints;
-  frames.base_T_link[0] = Pose::Identity();
+  frames.base_T_link[0] = arm.base_T_first;
   for (int j = 0; j < arm.joints; ++j) {
     const auto i = static_cast<std::size_t>(j);
     const DhRow& row = arm.dh[i];
@@ -248,6 +268,7 @@ LinkFrames forward(const ArmModel& arm, const JointVector& q_rad) {
     to.col(1) = turned_y * ca + from.col(2) * sa;
     to.col(2) = from.col(2) * ca - turned_y * sa;
     to.col(3) = from.col(3) + from.col(2) * row.d_m + to.col(0) * row.a_m;
+    if (!row.is_standard()) turn_further(row, to);
     frames.base_T_link[i + 1].makeAffine();
   }
   return frames;

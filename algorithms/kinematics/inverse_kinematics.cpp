@@ -101,11 +101,12 @@ Wrist wrist_of(const Pose& flange, const Eigen::Vector3d& z1, double sign, doubl
 }  // namespace
 
 bool has_closed_form_inverse(const ArmModel& arm) {
-  if (arm.joints != 6) return false;
+  if (arm.joints != 6 || !arm.base_T_first.isApprox(Pose::Identity(), 0)) return false;
   constexpr double kAlpha[] = {kPi / 2, 0, 0, kPi / 2, -kPi / 2, 0};
   for (std::size_t j = 0; j < 6; ++j) {
     const DhRow& row = arm.dh[j];
     if (std::abs(row.theta_offset_rad) > kNearby_rad || std::abs(row.alpha_rad - kAlpha[j]) > kNearby_rad) return false;
+    if (std::abs(row.beta_rad) > kNearby_rad || std::abs(row.gamma_rad) > kNearby_rad) return false;
     const bool is_link = j == 1 || j == 2;
     if (is_link && (std::abs(row.d_m) > kNearby_m || std::abs(row.a_m) < 10 * kNearby_m)) return false;
     if (!is_link && std::abs(row.a_m) > kNearby_m) return false;

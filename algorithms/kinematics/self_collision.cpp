@@ -59,6 +59,16 @@ SelfPairs self_pairs_of_arm(const Capsules& arm_body, double clearance_m) {
   return pairs;
 }
 
+SelfPairs self_pairs_of_arm(const ArmModel& arm, double clearance_m) {
+  if (!arm.own_pairs) return self_pairs_of_arm(arm.body, clearance_m);
+  SelfPairs pairs;
+  for (const CapsulePair& pair : arm.pairs) {
+    const double radii_m = arm.body[pair.near].radius_m + arm.body[pair.far].radius_m - 2 * kBodyPadding_m;
+    pairs.push_back({.near = pair.near, .far = pair.far, .axes_apart_m = radii_m + clearance_m});
+  }
+  return pairs;
+}
+
 double self_margin_m(const Capsules& placed, const SelfPairs& pairs) {
   double margin = std::numeric_limits<double>::infinity();
   for (const SelfPair& pair : pairs) {

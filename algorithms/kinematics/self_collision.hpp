@@ -27,6 +27,9 @@ using SelfPairs = FixedVector<SelfPair, kSelfPairsMax>;
 /// not turn past the forearm.
 [[nodiscard]] SelfPairs self_pairs_of_arm(const Capsules& arm_body, double clearance_m);
 
+/// The pairs of any arm: those that it lists itself, or for a UR as above.
+[[nodiscard]] SelfPairs self_pairs_of_arm(const ArmModel& arm, double clearance_m);
+
 /// Smallest distance beyond what the pairs require; negative: self collision. +infinity without pairs.
 [[nodiscard]] double self_margin_m(const Capsules& placed, const SelfPairs& pairs);
 

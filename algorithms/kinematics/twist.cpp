@@ -5,6 +5,13 @@
 
 namespace firstlook {
 
+namespace {
+
+/// Whether the next axis is parallel to the row's own.
+bool leaves_parallel(const DhRow& row) { return row.alpha_rad == 0 && row.beta_rad == 0; }
+
+}  // namespace
+
 LinkTwists link_twists(const LinkFrames& frames, const JointVector& dq) {
   LinkTwists twists;
   twists.joints = frames.joints;
@@ -26,8 +33,12 @@ LeverArms lever_arms(const ArmModel& arm, const Capsule& capsule) {
   const auto last = static_cast<std::size_t>(capsule.link - 1);  // joint whose row leads to the capsule's frame
   // The last joint: its axis is fixed in the link, so the distance from it is constant.
   const DhRow& row = arm.dh[last];
-  const Pose joint_T_link =
+  Pose joint_T_link =
       Eigen::Translation3d(row.a_m, 0, row.d_m) * Eigen::AngleAxisd(row.alpha_rad, Eigen::Vector3d::UnitX());
+  if (!row.is_standard()) {
+    joint_T_link = joint_T_link * Eigen::AngleAxisd(row.beta_rad, Eigen::Vector3d::UnitY()) *
+                   Eigen::AngleAxisd(row.gamma_rad, Eigen::Vector3d::UnitZ());
+  }
   const Eigen::Vector3d a = joint_T_link * capsule.a;
   const Eigen::Vector3d b = joint_T_link * capsule.b;
   levers[last] = std::max(a.head<2>().norm(), b.head<2>().norm());
@@ -35,10 +46,10 @@ LeverArms lever_arms(const ArmModel& arm, const Capsule& capsule) {
   const double tip = std::max(a.norm(), b.norm());
   for (std::size_t k = 0; k < last; ++k) {
     double reach = std::abs(arm.dh[k].a_m);
-    bool parallel = arm.dh[k].alpha_rad == 0;
+    bool parallel = leaves_parallel(arm.dh[k]);
     for (std::size_t m = k + 1; m < last; ++m) {
       reach += parallel ? std::abs(arm.dh[m].a_m) : std::hypot(arm.dh[m].a_m, arm.dh[m].d_m);
-      parallel = parallel && arm.dh[m].alpha_rad == 0;
+      parallel = parallel && leaves_parallel(arm.dh[m]);
     }
     levers[k] = reach + (parallel ? levers[last] : tip);
   }

@@ -9,7 +9,8 @@
 namespace firstlook {
 namespace {
 
-Eigen::Vector3d shoulder_m(const ArmModel& arm) { return {0, 0, arm.dh[0].d_m}; }  // axis 1 is z of the base
+/// Axis 1 is z of the base.
+Eigen::Vector3d shoulder_m(const ArmModel& arm) { return arm.base_T_first * Eigen::Vector3d(0, 0, arm.dh[0].d_m); }
 
 }  // namespace
 

@@ -62,7 +62,7 @@ Body bare_body(const ArmModel& arm) {
   Body body;
   body.allowance = base_allowance(arm);
   for (const Capsule& capsule : arm.body) append(body, arm, capsule);
-  body.self_pairs = self_pairs_of_arm(body.capsules, kSelfClearance_m);
+  body.self_pairs = self_pairs_of_arm(arm, kSelfClearance_m);
   return body;
 }
 

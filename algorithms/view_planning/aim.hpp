@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "algorithms/kinematics/numeric_inverse.hpp"
 #include "platform/core/random.hpp"
 #include "platform/core/transform.hpp"
 
@@ -31,6 +32,17 @@ template <typename Sensor>
   const double turn = random.uniform(0, 6.283185307179586);
   const Eigen::Vector3d u = axis.unitOrthogonal();
   return c * axis + s * (std::cos(turn) * u + std::sin(turn) * axis.cross(u));
+}
+
+/// Postures for a sensor on the flange to look at the point `distance_m` ahead of `base_T_sensor`: those of the very
+/// pose, or with fewer than six joints those that come nearest to it (inverse_looking). `sensor_T_flange` is its mount.
+template <typename Sensor>
+[[nodiscard]] InverseSolutions postures_looking(const ArmModel& arm, const Transform<Base, Sensor>& base_T_sensor,
+                                                const Transform<Sensor, Flange>& sensor_T_flange, double distance_m,
+                                                const JointVector& reference_rad) {
+  if (has_closed_form_inverse(arm)) return inverse(arm, base_T_sensor * sensor_T_flange, reference_rad);
+  return inverse_looking(arm, sensor_T_flange.pose().inverse(Eigen::Isometry), base_T_sensor.pose(), distance_m,
+                         reference_rad);
 }
 
 }  // namespace firstlook

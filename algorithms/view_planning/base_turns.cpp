@@ -40,7 +40,8 @@ TiltJoint tilt_joint(const ArmModel& arm, const JointVector& q_rad) {
   const Eigen::Vector3d view = frames.flange().rotation().col(2);
   TiltJoint best;
   double best_score = -1;
-  for (int joint = arm.joints - 2; joint >= 1; --joint) {
+  // The last joint of most arms rolls the view; that of an arm that only pans and tilts is what tilts it.
+  for (int joint = arm.joints == 2 ? 1 : arm.joints - 2; joint >= 1; --joint) {
     const Eigen::Vector3d axis = frames.base_T_link[static_cast<std::size_t>(joint)].linear().col(2);
     // Turning about `axis` moves the view's tip along axis x view: upwards is what tilts it. A view that points
     // straight up or down has no upwards, but then any level axis across it serves.

@@ -6,7 +6,6 @@
 #include <numbers>
 #include <vector>
 
-#include "algorithms/kinematics/inverse_kinematics.hpp"
 #include "algorithms/kinematics/self_collision.hpp"
 #include "algorithms/view_planning/aim.hpp"
 
@@ -105,7 +104,6 @@ void consider(Search& s, const JointVector& q) {
 
 void draw_aimed(Search& s) {
   const CalibrationViewInputs& in = s.inputs;
-  if (!has_closed_form_inverse(in.arm)) return;
   std::vector<const ViewDesignModel*> aims;
   for (std::size_t k = 0; k < in.models.size(); ++k) {
     if (s.options.wanted == 0 || (s.options.wanted >> k & 1U) != 0) aims.push_back(&in.models[k]);
@@ -120,7 +118,9 @@ void draw_aimed(Search& s) {
     const double roll_rad = s.random.uniform(0, 2 * std::numbers::pi);
     const Eigen::Vector3d target = center + 0.03 * s.random.normal3();  // the board need not be in the middle
     const auto base_T_camera = look_at<Camera>(target, direction, distance_m, roll_rad);
-    for (const JointVector& q : inverse(in.arm, base_T_camera * camera_T_flange, s.current)) consider(s, q);
+    for (const JointVector& q : postures_looking(in.arm, base_T_camera, camera_T_flange, distance_m, s.current)) {
+      consider(s, q);
+    }
   }
 }
 

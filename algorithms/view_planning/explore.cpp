@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "algorithms/kinematics/inverse_kinematics.hpp"
 #include "algorithms/view_planning/aim.hpp"
 #include "algorithms/view_planning/ray_walk.hpp"
 
@@ -108,7 +107,7 @@ JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
 bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const {
   const ViewContext& c = task.context;
   const std::span<const std::uint32_t> frontier = gain_.frontier();
-  if (frontier.empty() || !has_closed_form_inverse(c.arm)) return false;
+  if (frontier.empty()) return false;
   // The certificate goes through the frontier evenly; an ordinary choice picks at random.
   const auto n = static_cast<int>(frontier.size());
   const int pick =
@@ -129,7 +128,7 @@ bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointV
   const auto base_T_depth =
       look_at<Depth>(target, to_eye / distance_m, distance_m, random.uniform(0, 2 * std::numbers::pi));
   double nearest_rad = 1e9;
-  for (const JointVector& q : inverse(c.arm, base_T_depth * task.depth_T_flange, task.current)) {
+  for (const JointVector& q : postures_looking(c.arm, base_T_depth, task.depth_T_flange, distance_m, task.current)) {
     const double distance_rad = largest_joint_distance(q, task.current);
     if (distance_rad >= nearest_rad) continue;
     if (!configuration_is_free(c.arm, c.body, c.space, c.clearance, q, kTargetMargin_m)) continue;

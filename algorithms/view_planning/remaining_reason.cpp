@@ -5,7 +5,6 @@
 #include <numbers>
 #include <vector>
 
-#include "algorithms/kinematics/inverse_kinematics.hpp"
 #include "algorithms/view_planning/aim.hpp"
 #include "algorithms/view_planning/ray_walk.hpp"
 
@@ -85,7 +84,6 @@ void sample_views(Optimist& o, const ReasonOptions& options, Random& random) {
 
 /// The best sight that poses aimed at the voxel give.
 Sight aimed_sight(const Optimist& o, const Eigen::Vector3d& point, std::size_t voxel, Random& random) {
-  if (!has_closed_form_inverse(o.context.arm)) return Sight::kNone;
   const JointVector reference = JointVector::zero(o.context.arm.joints);
   Sight best = Sight::kNone;
   for (int i = 0; i < kAimedTries && best != Sight::kGood; ++i) {
@@ -95,8 +93,15 @@ Sight aimed_sight(const Optimist& o, const Eigen::Vector3d& point, std::size_t v
     const Sight seen = sight(o, base_T_depth, point, voxel);
     if (seen <= best) continue;
     const InverseSolutions solutions =
-        inverse(o.context.arm, base_T_depth * o.context.flange_T_depth.inverse(), reference);
-    if (std::any_of(solutions.begin(), solutions.end(), [&](const JointVector& q) { return o.fits(q); })) best = seen;
+        postures_looking(o.context.arm, base_T_depth, o.context.flange_T_depth.inverse(), distance_m, reference);
+    for (const JointVector& q : solutions) {
+      if (!o.fits(q)) continue;
+      // With few joints the sensor ends elsewhere than asked.
+      const Sight there = o.context.arm.joints < 6
+                              ? sight(o, forward(o.context.arm, q).flange() * o.context.flange_T_depth, point, voxel)
+                              : seen;
+      best = std::max(best, there);
+    }
   }
   return best;
 }

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "algorithms/kinematics/inverse_kinematics.hpp"
+#include "algorithms/kinematics/numeric_inverse.hpp"
 #include "algorithms/view_planning/ray_walk.hpp"
 
 namespace firstlook {
@@ -21,7 +21,7 @@ struct ScoredPose {
 
 /// Position on a sphere and orientation are drawn apart (figure 11-6).
 Transform<Base, Flange> draw_pose(const ArmModel& arm, const ThesisOptions& options, Random& random) {
-  const Eigen::Vector3d shoulder(0, 0, arm.dh[0].d_m);
+  const Eigen::Vector3d shoulder = arm.base_T_first * Eigen::Vector3d(0, 0, arm.dh[0].d_m);
   const double radius_m = random.uniform(options.radius_min_m, options.radius_max_m);
   const double polar = random.uniform(0, options.polar_max_rad);
   const double around = random.uniform(-std::numbers::pi, std::numbers::pi);
@@ -45,7 +45,7 @@ bool lies_in_free_space(const ViewContext& context, const Eigen::Vector3d& point
 bool find_posture(const ViewContext& context, const Transform<Base, Flange>& base_T_flange, const JointVector& current,
                   JointVector& q_rad) {
   double nearest_rad = std::numeric_limits<double>::infinity();
-  for (const JointVector& q : inverse(context.arm, base_T_flange, current)) {
+  for (const JointVector& q : inverse_of(context.arm, base_T_flange, current)) {
     const double distance_rad = (q - current).max_abs();
     if (distance_rad >= nearest_rad) continue;
     if (!configuration_is_free(context.arm, context.body, context.space, context.clearance, q, kTargetMargin_m))
@@ -79,7 +79,6 @@ ThesisScore score_as_thesis(const ViewContext& context, const Transform<Base, Fl
 
 Result<ViewChoice> choose_as_thesis(const ViewContext& context, const JointVector& current, Planner& planner,
                                     const ThesisOptions& options) {
-  ENSURE(4551, has_closed_form_inverse(context.arm));
   PlannerOptions planning;
   planning.seed = options.seed + options.step;
   planning.iterations_max = options.plan_iterations_max;

@@ -16,8 +16,10 @@ struct ConfigFlags {
 
   void add_to(CLI::App& app) {
     app.add_option("--config", file, "configuration file (YAML)");
-    app.add_option("--cell", cell,
-                   "simulated cell: empty, workshop, machine_tending, cluttered, hall, random:SEED, or a file");
+    app.add_option(
+        "--cell", cell,
+        "simulated cell: empty, workshop, machine_tending, cluttered, hall, two_joint, pr2_like, random:SEED, or a "
+        "file");
     app.add_option("--seed", seed, "seed of all random numbers");
     app.add_option("--workers", workers, "threads of one job (1 to 4); results do not depend on it");
   }

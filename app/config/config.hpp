@@ -22,7 +22,12 @@ struct Config {
 
   struct Arm {
     std::string model = "ur5";
-    double speed_max_m_s = 0.25;  ///< of every point of the body (safety rule 8)
+    std::string file = "none";       ///< .urdf or .yaml of an arm that is not built in; none: `model` is
+    std::string base_link = "auto";  ///< of a URDF's chain; auto: the only one that there is
+    std::string tip_link = "auto";
+    std::string links_without_body = "none";  ///< names (URDF) or numbers, with commas between
+    std::string mounting = "upright";         ///< upright | tilted: axis 1 plumb or not
+    double speed_max_m_s = 0.25;              ///< of every point of the body (safety rule 8)
     double speed_max_rad_s = 1.0;
     double acceleration_rad_s2 = 1.4;
     bool operator==(const Arm&) const = default;

@@ -16,7 +16,8 @@ namespace firstlook {
 namespace {
 
 constexpr std::string_view kStartSources[] = {"pendant", "panel"};
-constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"};
+constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "two_joint", "pr2_like"};
+constexpr std::string_view kMountings[] = {"upright", "tilted"};
 constexpr std::string_view kViews[] = {"firstlook", "thesis2014"};
 constexpr std::string_view kHoles[] = {"ignore", "clear_when_corroborated"};
 
@@ -40,6 +41,17 @@ void add_job_keys(Keys& keys, Config& c) {
 
 void add_arm_keys(Keys& keys, Config& c) {
   keys.push_back({"arm.model", &c.arm.model, 0, 0, kArmModels, "arm on the cart"});
+  keys.push_back({"arm.file", &c.arm.file, 0, 0, {}, "URDF or YAML of an arm that is not built in; none: arm.model"});
+  keys.push_back({"arm.base_link", &c.arm.base_link, 0, 0, {}, "where a URDF's arm begins; auto: its root"});
+  keys.push_back({"arm.tip_link", &c.arm.tip_link, 0, 0, {}, "the flange in a URDF; auto: the end of its only chain"});
+  keys.push_back({"arm.links_without_body",
+                  &c.arm.links_without_body,
+                  0,
+                  0,
+                  {},
+                  "links of arm.file that have no body of their own, with commas between; none"});
+  keys.push_back(
+      {"arm.mounting", &c.arm.mounting, 0, 0, kMountings, "tilted: axis 1 does not stand upright (wall, ceiling)"});
   keys.push_back({"arm.speed_max_m_s", &c.arm.speed_max_m_s, 0.01, 1.0, {}, "limit for every point of the body"});
   keys.push_back({"arm.speed_max_rad_s", &c.arm.speed_max_rad_s, 0.01, 3.14, {}, "limit for every joint"});
   keys.push_back({"arm.acceleration_rad_s2", &c.arm.acceleration_rad_s2, 0.05, 10, {}, "of every joint"});
@@ -110,7 +122,7 @@ void add_space_keys(Keys& keys, Config& c) {
   keys.push_back({"camera_envelope_radius_m",
                   &c.camera_envelope_radius_m,
                   0.02,
-                  0.6,
+                  1.0,
                   {},
                   "sphere at the flange that holds camera and gripper until the calibration is accepted"});
 }

@@ -371,13 +371,17 @@ std::string covariance_text(const Matrix6d& covariance) {
 std::uint64_t kinematics_checksum(const ArmModel& arm) {
   constexpr double kSteps = 1e7;  // 0.1 um and 0.1 urad
   Fnv1a hash;
-  hash.add(std::as_bytes(std::span(arm.name)));
+  hash.add(std::as_bytes(std::span(arm.name.view())));
   for (int i = 0; i < arm.joints; ++i) {
     const DhRow& row = arm.dh[static_cast<std::size_t>(i)];
-    for (const double value : {row.theta_offset_rad, row.d_m, row.a_m, row.alpha_rad}) {
+    const auto add = [&hash](double value) {
       const std::int64_t steps = std::llround(value * kSteps);
       hash.add(std::as_bytes(std::span(&steps, 1)));
-    }
+    };
+    for (const double value : {row.theta_offset_rad, row.d_m, row.a_m, row.alpha_rad}) add(value);
+    if (row.is_standard()) continue;
+    add(row.beta_rad);
+    add(row.gamma_rad);
   }
   return hash.value();
 }
@@ -447,15 +451,15 @@ Status check_belongs(const StoredCalibration& calibration, const ArmModel& arm, 
   if (calibration.arm_model == kUnknownArm) {
     return failure(Fault::kStoredCalibration,
                    "it does not say which arm it was made with: solve it again with `firstlook calibrate --arm {}`",
-                   arm.name);
+                   arm.name.view());
   }
-  if (calibration.arm_model != arm.name) {
+  if (calibration.arm_model != arm.name.view()) {
     return failure(Fault::kStoredCalibration, "it was made with the arm {:.20}, this one is {}", calibration.arm_model,
-                   arm.name);
+                   arm.name.view());
   }
   if (calibration.kinematics != kinematics_checksum(arm)) {
     return failure(Fault::kStoredCalibration, "it was made with other kinematics of the {}: checksum {}, now {}",
-                   arm.name, hash_text(calibration.kinematics), hash_text(kinematics_checksum(arm)));
+                   arm.name.view(), hash_text(calibration.kinematics), hash_text(kinematics_checksum(arm)));
   }
   const CameraIntrinsics& a = calibration.intrinsics;
   if (a.width == 0) {

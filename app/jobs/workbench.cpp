@@ -57,6 +57,17 @@ PlaneFitOptions plane_fit_of(const Config& config) {
 
 GroundPlane ground_of(const Config& config) { return {config.map.ground_height_m, config.map.ground_tolerance_m}; }
 
+/// Safe zone, sweep and certificates hold about axis 1 wherever it points. A level floor and what stands on it do not.
+Status check_mounting(const Config& config) {
+  if (config.arm.mounting != "tilted") return {};
+  const char* const key = config.map.ground_tolerance_m > 0 ? "map.ground_tolerance_m"
+                          : map_planes_of(config).label     ? "map.planes: label"
+                                                            : nullptr;
+  if (key == nullptr) return {};
+  return failure(Fault::kConfigBadValue,
+                 "{} needs z of the arm's base to point up, which arm.mounting: tilted says it does not", key);
+}
+
 ClearanceInputs clearance_inputs(const Config& config) {
   ClearanceInputs in;
   in.voxel_m = config.map.resolution_m;
@@ -76,6 +87,11 @@ Result<std::unique_ptr<Workbench>> Workbench::make(const Config& config, const C
                                                    WorkerPool& workers) {
   const auto arm = facts.arm ? facts.arm : find_arm_model(config.arm.model);
   if (!arm) return failure(Fault::kConfigBadValue, "arm.model: {} is not built in", config.arm.model);
+  if (const Status stands = check_mounting(config); !stands) return std::unexpected(stands.error());
+  if (config.parking_rad && config.parking_rad->size() != arm->joints) {
+    return failure(Fault::kConfigBadValue, "parking_rad: {} angles, but the arm {} has {} joints",
+                   config.parking_rad->size(), arm->name.view(), arm->joints);
+  }
   if (facts.stored) {
     const Status fits = check_belongs(*facts.stored, *arm, color.intrinsics(), facts.camera_T_depth,
                                       config.calibration.intrinsics == "estimate");
@@ -139,7 +155,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
       published_(geometry, kFieldMax_m) {
   take_options();
   map_.set_safe_zone(zone_cylinder_);
-  for (const Capsule& capsule : arm_.body) {
+  for (const Capsule& capsule : place(arm_.body, forward(arm_, facts_.start_rad))) {
     if (capsule.link == 0) map_.note_fixed_body(capsule, kSelfPadding_m);
   }
   for (const Config::KeepOut& box : config.keep_out) map_.block(AxisBox{vector_of(box.low_m), vector_of(box.high_m)});

@@ -45,7 +45,7 @@ struct CellFacts {
   JointVector start_rad;                    ///< where the sweep turns around, and where the job parks
   Transform<Camera, Depth> camera_T_depth;  ///< as its maker states it
   std::optional<StoredCalibration> stored;  ///< of an earlier job; for scopes that verify it
-  std::optional<ArmModel> arm{};            ///< as this very arm was measured; empty: as published for its model
+  std::optional<ArmModel> arm{};  ///< as measured, or from a file; empty: the one that the configuration names
 };
 
 /// A target as it was seen from one stop of the calibration. Those of one stop have the same number of it, their

@@ -287,7 +287,7 @@ struct RobotRecord {
 struct Provenance {
   std::string version;
   std::string arm_model;
-  std::uint64_t kinematics = 0;  ///< kinematics_checksum of the arm's model in this run; 0: as published
+  std::uint64_t kinematics = 0;  ///< kinematics_checksum of the arm in this run; 0: as published
   std::string sensor;            ///< "full" or "fast"
   std::string config_yaml;       ///< print_config of what the run used
   std::string journal_hash;

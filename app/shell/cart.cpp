@@ -335,7 +335,7 @@ void Cart::fill_calibration(RunRecord& record) const {
   record.intrinsics = bench_->camera();
   record.alignment = bench_->alignment();
   record.verified = bench_->verified();
-  record.provenance.arm_model = config_.arm.model;
+  record.provenance.arm_model = bench_->arm().name.view();
   record.provenance.kinematics = kinematics_checksum(bench_->arm());
 }
 

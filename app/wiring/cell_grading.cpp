@@ -35,7 +35,8 @@ std::optional<TruthRecord::Way> way_to(const std::optional<double>& time_s, cons
 }  // namespace
 
 void describe_cell(const sim::CellDescription& cell, Config& config) {
-  config.arm.model = cell.arm_model;
+  if (cell.arm_file.empty()) config.arm.model = cell.arm.name.view();
+  config.arm.file = cell.arm_file.empty() ? "none" : cell.arm_file;
   config.safe_zone = {cell.safe_zone.radius_m, cell.safe_zone.height_m};
   config.cart.top_m = cell.cart_top_m;
   set_targets(cell.boards, config);
@@ -43,6 +44,11 @@ void describe_cell(const sim::CellDescription& cell, Config& config) {
   for (const sim::KeepOut& box : cell.keep_out) {
     config.keep_out.push_back(
         {{box.low_m.x(), box.low_m.y(), box.low_m.z()}, {box.high_m.x(), box.high_m.y(), box.high_m.z()}});
+  }
+  if (cell.camera_envelope_m > 0) config.camera_envelope_radius_m = cell.camera_envelope_m;
+  if (cell.map) {
+    config.map.low_m = {cell.map->low_m.x(), cell.map->low_m.y(), cell.map->low_m.z()};
+    config.map.high_m = {cell.map->high_m.x(), cell.map->high_m.y(), cell.map->high_m.z()};
   }
   if (!config.parking_rad) config.parking_rad = cell.start_rad;
 }

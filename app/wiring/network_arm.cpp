@@ -10,6 +10,14 @@
 
 namespace firstlook {
 
+Status refuse_other_arms(const Config& config) {
+  if (config.arm.file == "none") return {};
+  return failure(Fault::kConfigBadValue,
+                 "arm.file: {} and robot.host: {} do not go together: a robot on the network is one of arm.model, and "
+                 "tells its kinematics itself",
+                 config.arm.file, config.robot.host);
+}
+
 /// What the robot's side has to say, among the lines of the job.
 class NetworkArm::Notices final : public ur::NoticeSink {
  public:

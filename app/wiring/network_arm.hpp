@@ -15,6 +15,9 @@
 
 namespace firstlook {
 
+/// kConfigBadValue for an arm from a file: a robot on the network tells its kinematics itself.
+[[nodiscard]] Status refuse_other_arms(const Config& config);
+
 class NetworkArm final : public hal::ReportingDevice {
  public:
   /// Connects to `config.robot.host`, identifies it and says so. Errors: those of ur::NetworkRobot::connect, and

@@ -61,6 +61,7 @@ Status refuse_what_does_not_fit(const RunCommand& command, const Config& config)
                      key);
     }
   }
+  if (const Status fits = refuse_other_arms(config); !fits) return fits;
   if (config.start_source == "panel" && config.panel.can_interface == "none") {
     return failure(Fault::kConfigBadValue, "start_source: panel wants a panel: panel.can_interface is none");
   }

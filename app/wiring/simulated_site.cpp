@@ -1,3 +1,4 @@
+#include "app/config/arm_file.hpp"
 #include "app/config/board_config.hpp"
 #include "app/wiring/cell_grading.hpp"
 #include "app/wiring/job_site.hpp"
@@ -20,9 +21,8 @@ class SimulatedSite final : public JobSite {
             arm_ ? arm_->pendant() : cell_->pendant(), cell_->panel()};
   }
   CellFacts facts() const override {
-    CellFacts facts{cell_->description().start_rad, cell_->description().camera_T_depth, {}, {}};
-    if (arm_) facts.arm = arm_->model();
-    return facts;
+    const sim::CellDescription& cell = cell_->description();
+    return {cell.start_rad, cell.camera_T_depth, {}, arm_ ? arm_->model() : cell.arm};
   }
   bool in_real_time() const override { return arm_ != nullptr; }
   void begin(const PublishedSpace& space) override {
@@ -43,11 +43,20 @@ class SimulatedSite final : public JobSite {
   std::optional<KnownFree> known_free_;
 };
 
+/// The arm of a file, and in words what was taken from it.
+Result<ArmModel> read_arm(const std::string& path, const Config::Arm& config, Narrator& narrator) {
+  const auto read = read_arm_file(path, arm_file_options(config));
+  if (!read) return std::unexpected(read.error());
+  narrator.line("arm       " + read->summary);
+  return read->arm;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, Config& config, Narrator& narrator) {
   std::unique_ptr<sim::ur::TruthReader> truth;
   if (config.robot.given()) {
+    if (const Status fits = refuse_other_arms(config); !fits) return std::unexpected(fits.error());
     if (config.calibration.touch_test == "yes") {
       return failure(Fault::kUsage, "calibration.touch_test: the simulated person leads the cell's own arm only");
     }
@@ -57,9 +66,11 @@ Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, 
       return std::unexpected(followed.error());
     }
   }
+  const sim::ArmChoice choice = {config.arm.file == "none" ? "" : config.arm.file,
+                                 [&](const std::string& path) { return read_arm(path, config.arm, narrator); }};
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
                                         command.faults, config.workers, configured_boards(config), config.depth.sensor,
-                                        truth.get()});
+                                        truth.get(), choice});
   if (!cell) return std::unexpected(cell.error());
   describe_cell((*cell)->description(), config);
   std::unique_ptr<NetworkArm> arm;

@@ -112,11 +112,45 @@ solids:
   - {name: column, cylinder: {radius_m: 0.20, height_m: 6.0}, position_m: [2.20, 2.40, 2.15], color: [0.6, 0.6, 0.58]}
 )";
 
-constexpr BuiltInCell kCells[] = {{"empty", kEmpty},
-                                  {"workshop", kWorkshop},
-                                  {"machine_tending", kMachineTending},
-                                  {"cluttered", kCluttered},
-                                  {"hall", kHall}};
+// The thesis's first simulation (chapter 3): a link of 1.1 m that pans and tilts; the camera 600 mm behind its end and
+// 275 mm above, 800x600 with 45 degrees; the marker 2.5 m away and 1.45 m high, 0.5 m wide.
+constexpr std::string_view kTwoJoint = R"(arm: two_joint
+floor_m: -0.1
+walls: {low_m: [-2.6, -2.8], high_m: [3.2, 2.8], height_m: 3.2}
+safe_zone: {radius_m: 1.9, height_m: 2.75}
+camera_envelope_m: 0.73
+map: {low_m: [-1.55, -1.55, 0.4], high_m: [1.55, 1.55, 2.5]}
+board: {center_m: [2.5, 0, 1.35], faces: [-1, 0, 0], inner_columns: 9, inner_rows: 6, square_size_m: 0.05}
+camera:
+  position_m: [0, -0.275, -0.6]
+  rpy_deg: [0, 0, 0]
+  color: {width: 800, height: 600, fx: 965.69, fy: 965.69, cx: 400.5, cy: 300.5, k1: 0, k2: 0, p1: 0, p2: 0, k3: 0}
+solids:
+  - {name: board's post, box: {size_m: [0.04, 0.10, 1.2]}, position_m: [2.56, 0, 0.5]}
+  - {name: cabinet, box: {size_m: [0.5, 0.6, 1.6]}, position_m: [1.8, -1.6, 0.7], color: [0.60, 0.62, 0.60]}
+  - {name: crate, box: {size_m: [0.5, 0.5, 0.8]}, position_m: [1.8, 1.5, 0.3], color: [0.62, 0.50, 0.34]}
+)";
+
+// A right arm with seven joints beside a torso, a head and another arm, which hide a part of what it could see.
+constexpr std::string_view kPr2Like = R"(arm: pr2_like
+floor_m: -0.95
+walls: {low_m: [-2.0, -2.1], high_m: [2.2, 2.0], height_m: 2.6}
+cart: {low_m: [-0.45, -0.25], high_m: [0.25, 0.55], top_m: -0.42}
+safe_zone: {radius_m: 0.72, height_m: 1.15}
+map: {low_m: [-1.5, -1.5, -0.5], high_m: [1.5, 1.5, 1.3]}
+board: {center_m: [0.88, -0.74, 0.50], faces: [-0.88, 0.74, -0.05]}
+solids:
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.35}, position_m: [0.94, -0.79, -0.275]}
+  - {name: table, box: {size_m: [0.60, 1.20, 0.04]}, position_m: [1.15, 0.10, -0.30], color: [0.55, 0.42, 0.28]}
+  - {name: carton, box: {size_m: [0.22, 0.30, 0.30]}, position_m: [1.10, 0.25, -0.13], rpy_deg: [0, 0, 25], color: [0.66, 0.52, 0.34]}
+  - {name: shelf, box: {size_m: [0.8, 0.35, 1.5]}, position_m: [0.2, -1.35, -0.20], color: [0.50, 0.50, 0.54]}
+  - {name: cupboard, box: {size_m: [0.4, 0.8, 1.6]}, position_m: [-1.2, -0.5, -0.15], color: [0.60, 0.62, 0.60]}
+)";
+
+constexpr BuiltInCell kCells[] = {
+    {"empty", kEmpty},         {"workshop", kWorkshop}, {"machine_tending", kMachineTending},
+    {"cluttered", kCluttered}, {"hall", kHall},         {"two_joint", kTwoJoint},
+    {"pr2_like", kPr2Like}};
 
 }  // namespace
 

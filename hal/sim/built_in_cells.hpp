@@ -12,7 +12,7 @@ struct BuiltInCell {
   std::string_view yaml;
 };
 
-/// empty, workshop, machine_tending, cluttered, hall.
+/// empty, workshop, machine_tending, cluttered, hall, two_joint, pr2_like.
 [[nodiscard]] std::span<const BuiltInCell> built_in_cells();
 [[nodiscard]] std::optional<BuiltInCell> find_built_in_cell(std::string_view name);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <initializer_list>
 #include <limits>
@@ -336,13 +337,14 @@ void read_intrinsics(const Section& parent, const char* key, CameraIntrinsics& c
   camera.k3 = section.number_or("k3", camera.k3, -2, 2);
 }
 
-void read_camera(const Section& cell, Scene& scene, const ArmModel& arm, std::uint64_t seed) {
+void read_camera(const Section& cell, Scene& scene, std::uint64_t seed, bool on_last_link) {
+  const ArmModel& arm = scene.arm;
   CameraMount& mount = scene.mount;
   mount = default_mount(arm.joints);
   if (cell.has("camera")) {
     const Section camera(cell.file(), cell.child("camera"), "camera",
                          {"link", "position_m", "rpy_deg", "exact", "color", "depth", "depth_position_m"});
-    mount.link = camera.integer_or("link", mount.link, 0, arm.joints);
+    if (!on_last_link) mount.link = camera.integer_or("link", mount.link, 0, arm.joints);
     const Pose given = read_pose(camera);
     if (camera.has("position_m")) mount.link_T_camera.translation() = given.translation();
     if (camera.has("rpy_deg")) mount.link_T_camera.linear() = given.linear();
@@ -372,28 +374,63 @@ void read_light(const Section& cell, Scene& scene) {
   scene.light.gradient_per_m = light.vector_or("gradient_per_m", scene.light.gradient_per_m, -1, 1);
 }
 
-Scene read_cell(const std::string& name, const YAML::Node& root, std::uint64_t seed) {
+/// An arm's file stands beside the cell's unless its path says otherwise.
+std::string beside(const std::string& cell, const std::string& file) {
+  return (std::filesystem::path(cell).parent_path() / file).string();
+}
+
+/// The arm in place of the cell's own, else the one that it names: built in, or a file.
+void read_arm(const Section& cell, Scene& scene, const ArmChoice& choice) {
+  std::string file = choice.file;
+  if (file.empty() && cell.has("arm")) {
+    const std::string name = cell.text_or("arm", "");
+    const std::string extension = std::filesystem::path(name).extension();
+    if (extension == ".urdf" || extension == ".yaml" || extension == ".yml") {
+      file = beside(cell.file(), name);
+    } else if (const std::optional<ArmModel> built_in = find_arm_model(name)) {
+      scene.arm = *built_in;
+    } else {
+      cell.fail(cell.child("arm"),
+                "unknown arm '{}': ur3, ur5, ur10, ur3e, ur5e, ur10e, two_joint, pr2_like, or a file (.urdf, .yaml)",
+                name);
+    }
+  }
+  if (file.empty()) return;
+  if (!choice.load) cell.fail(cell.child("arm"), "an arm from a file cannot be read here");
+  const Result<ArmModel> arm = choice.load(file);
+  if (!arm) throw CellFailure{arm.error()};
+  scene.arm = *arm;
+  scene.arm_file = file;
+}
+
+Scene read_cell(const std::string& name, const YAML::Node& root, std::uint64_t seed, const ArmChoice& choice) {
   const Section cell(name, root, "",
                      {"arm", "start_deg", "floor_m", "walls", "cart", "safe_zone", "board", "boards", "camera", "light",
-                      "solids", "regions", "keep_out"});
+                      "solids", "regions", "keep_out", "camera_envelope_m", "map"});
   Scene scene;
   scene.name = name;
-  scene.arm_model = cell.text_or("arm", scene.arm_model);
-  const std::optional<ArmModel> arm = find_arm_model(scene.arm_model);
-  if (!arm) cell.fail(cell.child("arm"), "unknown arm '{}'", scene.arm_model);
-  scene.start_rad = default_start(*arm);
-  if (cell.has("start_deg")) {
-    const std::vector<double> degrees = cell.numbers("start_deg", static_cast<std::size_t>(arm->joints), -360, 360);
-    for (int i = 0; i < arm->joints; ++i) scene.start_rad[i] = degrees[static_cast<std::size_t>(i)] * kRadians;
+  read_arm(cell, scene, choice);
+  const ArmModel& arm = scene.arm;
+  scene.start_rad = default_start(arm);
+  if (cell.has("start_deg") && choice.file.empty()) {
+    const std::vector<double> degrees = cell.numbers("start_deg", static_cast<std::size_t>(arm.joints), -360, 360);
+    for (int i = 0; i < arm.joints; ++i) scene.start_rad[i] = degrees[static_cast<std::size_t>(i)] * kRadians;
   }
   read_room(cell, scene);
   read_cart(cell, scene);
   read_boards(cell, scene);
-  read_camera(cell, scene, *arm, seed);
+  read_camera(cell, scene, seed, !choice.file.empty());
   read_light(cell, scene);
   read_solids(cell, scene);
   read_regions(cell, "regions", scene.regions);
   read_regions(cell, "keep_out", scene.keep_out);
+  scene.camera_envelope_m = cell.number_or("camera_envelope_m", 0, 0.05, 1);
+  if (cell.has("map")) {
+    const Section map(cell.file(), cell.child("map"), "map", {"low_m", "high_m"});
+    scene.map = Region{"map", map.vector("low_m"), map.vector("high_m")};
+    if (!(scene.map->low_m.array() < scene.map->high_m.array()).all())
+      map.fail(cell.child("map"), "low_m must lie below high_m");
+  }
   return scene;
 }
 
@@ -452,9 +489,9 @@ Status check_cell(const Scene& scene) {
   return {};
 }
 
-Result<Scene> parse_cell(std::string_view yaml, const std::string& name, std::uint64_t seed) {
+Result<Scene> parse_cell(std::string_view yaml, const std::string& name, std::uint64_t seed, const ArmChoice& arm) {
   try {
-    Scene scene = read_cell(name, YAML::Load(std::string(yaml)), seed);
+    Scene scene = read_cell(name, YAML::Load(std::string(yaml)), seed, arm);
     if (const Status usable = check_cell(scene); !usable) return std::unexpected(usable.error());
     return scene;
   } catch (const CellFailure& wrong) {
@@ -464,7 +501,7 @@ Result<Scene> parse_cell(std::string_view yaml, const std::string& name, std::ui
   }
 }
 
-Result<Scene> load_cell(std::string_view name_or_file, std::uint64_t seed) {
+Result<Scene> load_cell(std::string_view name_or_file, std::uint64_t seed, const ArmChoice& arm) {
   constexpr std::string_view kRandom = "random:";
   if (name_or_file.starts_with(kRandom)) {
     const std::string_view digits = name_or_file.substr(kRandom.size());
@@ -473,10 +510,14 @@ Result<Scene> load_cell(std::string_view name_or_file, std::uint64_t seed) {
     if (code != std::errc() || end != digits.data() + digits.size()) {
       return failure(Fault::kCellInvalid, "{}: after 'random:' stands a whole number", name_or_file);
     }
+    if (!arm.file.empty()) {
+      return failure(Fault::kCellInvalid, "{}: drawn cells are drawn for a ur5; take another cell for {}", name_or_file,
+                     arm.file);
+    }
     return make_random_cell(cell_seed, seed);
   }
   if (const std::optional<BuiltInCell> cell = find_built_in_cell(name_or_file)) {
-    return parse_cell(cell->yaml, std::string(cell->name), seed);
+    return parse_cell(cell->yaml, std::string(cell->name), seed, arm);
   }
   const std::string path(name_or_file);
   std::ifstream file(path);
@@ -487,7 +528,7 @@ Result<Scene> load_cell(std::string_view name_or_file, std::uint64_t seed) {
     return failure(Fault::kDataMissing, "{}: neither a file that can be read nor a built-in cell ({}random:SEED)", path,
                    names);
   }
-  return parse_cell(text.str(), path, seed);
+  return parse_cell(text.str(), path, seed, arm);
 }
 
 }  // namespace firstlook::sim

@@ -50,7 +50,7 @@ class Layout {
       : random_(mix64(cell_seed), kLayoutStream + 1000 * static_cast<std::uint64_t>(draw)) {}
 
   Scene draw() {
-    scene_.start_rad = default_start(*find_arm_model(scene_.arm_model));
+    scene_.start_rad = default_start(scene_.arm);
     scene_.start_rad[0] = random_.uniform(-kPi, kPi);
     scene_.safe_zone.floor_m = kCartTop_m;
     scene_.mount = default_mount(6);
@@ -275,7 +275,7 @@ Pose assembled(const Pose& nominal, std::uint64_t seed) {
 }
 
 std::vector<JointVector> board_views(const Scene& scene, int tries, std::uint64_t seed) {
-  const ArmModel arm = *find_arm_model(scene.arm_model);
+  const ArmModel& arm = scene.arm;
   const Body body = body_with_envelope(arm);
   const Capsules hiding = true_body(arm);
   const Renderer renderer(scene);
@@ -298,7 +298,7 @@ Result<Scene> make_random_cell(std::uint64_t cell_seed, std::uint64_t seed) {
     Scene scene = Layout(cell_seed, draw).draw();
     scene.name = fmt::format("random:{}", cell_seed);
     scene.mount.link_T_camera = assembled(scene.mount.link_T_camera, seed);
-    const ArmModel arm = *find_arm_model(scene.arm_model);
+    const ArmModel& arm = scene.arm;
     Scene with_margin = scene;
     with_margin.boards.clear();  // the board, too, stands outside
     if (!check_cell(with_margin)) continue;

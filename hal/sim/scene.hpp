@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -97,7 +98,8 @@ struct Light {
 /// Everything in Base: z = 0 is the arm's mounting plate.
 struct Scene {
   std::string name;
-  std::string arm_model = "ur5";
+  ArmModel arm = *find_arm_model("ur5");
+  std::string arm_file;  ///< that the arm was read from; empty: it is built in
   JointVector start_rad;
   std::vector<Solid> solids;  ///< floor, walls, cart and the boards' panels included; not the arm
   std::vector<BoardPlacement> boards = std::vector<BoardPlacement>(1);
@@ -107,6 +109,8 @@ struct Scene {
   std::vector<Region> regions;
   std::vector<Region> keep_out;
   Light light;
+  double camera_envelope_m = 0;  ///< radius about the flange in which the camera sits; 0: the default of the program
+  std::optional<Region> map;     ///< what the map has to cover; empty: the default of the program
 };
 
 /// Distance between a segment and a solid, to 1e-6 m; 0 when they meet. A capsule touches the solid where it is at most

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "algorithms/kinematics/arm_model.hpp"
 
@@ -44,8 +43,7 @@ void shift_board(Scene& scene, const Faults& faults) {
 
 /// A box in reach, one radian to the left of where the hand stood at first, as high as the upper arm.
 void add_obstacle(Scene& scene, const Faults& /*faults*/) {
-  const std::optional<ArmModel> arm = find_arm_model(scene.arm_model);
-  const Eigen::Vector3d hand = arm ? forward(*arm, scene.start_rad).flange().translation() : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d hand = forward(scene.arm, scene.start_rad).flange().translation();
   const double azimuth_rad = std::atan2(hand.y(), hand.x()) + kObstacleTurn_rad;
   Solid box;
   box.name = "obstacle";

@@ -29,8 +29,9 @@ SimulatedArm::SimulatedArm(const SimulatedArmOptions& options, BodyWatcher* watc
       next_tick_{kReportPeriod.ns},
       last_true_rad_(options.start_rad) {
   ENSURE(5002, options.start_rad.size() == model_.joints);
-  const std::size_t length = std::min(model_.name.size(), model_name_.size() - 1);
-  std::copy_n(model_.name.begin(), length, model_name_.begin());
+  const std::string_view name = model_.name;
+  const std::size_t length = std::min(name.size(), model_name_.size() - 1);
+  std::copy_n(name.begin(), length, model_name_.begin());
   std::stable_sort(script_.begin(), script_.end(),
                    [](const ControllerEvent& a, const ControllerEvent& b) { return a.stamp < b.stamp; });
   motions_[0] = rest(Instant{}, options.start_rad);

@@ -95,7 +95,8 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
                               const SimulationOptions& options) {
   CellDescription d;
   d.name = scene.name;
-  d.arm_model = scene.arm_model;
+  d.arm = scene.arm;
+  d.arm_file = scene.arm_file;
   d.start_rad = scene.start_rad;
   d.color = stated_intrinsics(scene.mount.color, faults);
   d.depth = renderer.depth_intrinsics(detail(options));
@@ -107,6 +108,8 @@ CellDescription describe_cell(const Scene& scene, const Renderer& renderer, cons
   d.cart_top_m = scene.safe_zone.floor_m;
   d.safe_zone = scene.safe_zone;
   for (const Region& region : scene.keep_out) d.keep_out.push_back({region.low_m, region.high_m});
+  d.camera_envelope_m = scene.camera_envelope_m;
+  if (scene.map) d.map = KeepOut{scene.map->low_m, scene.map->high_m};
   return d;
 }
 
@@ -220,24 +223,23 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
   const memory::SimulationScope simulation;
   const Result<Faults> faults = parse_faults(options.faults);
   if (!faults) return std::unexpected(faults.error());
-  Result<Scene> scene = load_cell(options.cell, options.seed);
+  Result<Scene> scene = load_cell(options.cell, options.seed, options.arm);
   if (!scene) return std::unexpected(scene.error());
   if (const Status hung = hang_boards(options.boards, *scene); !hung) return std::unexpected(hung.error());
-  std::optional<ArmModel> model = find_arm_model(scene->arm_model);
-  if (!model) return failure(Fault::kCellInvalid, "{}: no arm model '{}'", scene->name, scene->arm_model);
-  if (scene->start_rad.size() != model->joints) {
-    return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, model->joints);
+  if (scene->start_rad.size() != scene->arm.joints) {
+    return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, scene->arm.joints);
   }
+  ArmModel model = scene->arm;
   if (options.feed != nullptr) {
     if (acts_on_arm(*faults)) {
       return failure(Fault::kUsage, "--faults: what happens to arm, link and operator is up to the robot's simulation");
     }
-    model->dh = options.feed->true_dh();
+    model.dh = options.feed->true_dh();
   }
   const std::optional<SensorPreset> sensor = find_sensor_preset(options.sensor);
   if (!sensor) return failure(Fault::kUsage, "no depth sensor '{}'", options.sensor);
   if (!scene->mount.depth_is_given) scene->mount.depth = sensor->intrinsics;
-  return std::make_unique<Cell>(*scene, depth_sensor_model(*sensor), *model, *faults, options);
+  return std::make_unique<Cell>(*scene, depth_sensor_model(*sensor), model, *faults, options);
 }
 
 }  // namespace firstlook::sim

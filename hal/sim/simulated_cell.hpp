@@ -12,6 +12,7 @@
 #include "hal/api/cameras.hpp"
 #include "hal/api/operator_devices.hpp"
 #include "hal/api/robot_arm.hpp"
+#include "hal/sim/cell_file.hpp"
 #include "hal/sim/followed_arm.hpp"
 #include "hal/sim/grader.hpp"
 #include "platform/core/camera_intrinsics.hpp"
@@ -34,6 +35,7 @@ struct SimulationOptions {
   /// Where the true joints come from when another process moves the arm, and it is not the cell's; null: the cell's own
   /// arm moves. Outlives the cell.
   TrueJointFeed* feed = nullptr;
+  ArmChoice arm{};  ///< reads arms from files; may put one in place of the cell's own
 };
 
 /// A region of space in base coordinates that nothing may enter, as the configuration has it.
@@ -45,7 +47,8 @@ struct KeepOut {
 /// What an integrator would have typed in for this cell: nothing that the job has to find out.
 struct CellDescription {
   std::string name;
-  std::string arm_model;
+  ArmModel arm;
+  std::string arm_file;    ///< that it was read from; empty: it is built in
   JointVector start_rad;   ///< where the arm stands before the job
   CameraIntrinsics color;  ///< of the factory sheet
   CameraIntrinsics depth;
@@ -56,6 +59,8 @@ struct CellDescription {
   double cart_top_m = -0.02;                                 ///< z of the cart's own top
   SafeZone safe_zone;
   std::vector<KeepOut> keep_out;
+  double camera_envelope_m = 0;     ///< 0: as the configuration has it
+  std::optional<KeepOut> map = {};  ///< box that the map covers; empty: as the configuration has it
 };
 
 /// Owns scene, devices and grader. Devices may be used as hal/api says; their references live as long as the cell.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "algorithms/kinematics/inverse_kinematics.hpp"
+#include "algorithms/kinematics/numeric_inverse.hpp"
 #include "algorithms/vision/rotation.hpp"
 #include "hal/sim/random_streams.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -98,7 +98,7 @@ void TouchingHand::begin(Instant now) {
 std::optional<JointVector> TouchingHand::reach(const Pose& base_T_flange) const {
   const auto nearest = [&](const Pose& pose, const JointVector& to) -> std::optional<JointVector> {
     std::optional<JointVector> best;
-    for (const JointVector& q : inverse(model_, Transform<Base, Flange>(pose), to)) {
+    for (const JointVector& q : inverse_of(model_, Transform<Base, Flange>(pose), to)) {
       if (!best || (q - to).max_abs() < (*best - to).max_abs()) best = q;
     }
     return best;
@@ -115,7 +115,6 @@ std::optional<JointVector> TouchingHand::joints_on(int point) {
   const Pose& base_T_board = board().base_T_board.pose();
   const Eigen::Vector3d tip = base_T_board * board().spec.corner(point) + kHandSigma_m * random_.normal3();
   const Eigen::Vector3d tilt_rad(random_.uniform(-kTilt_rad, kTilt_rad), random_.uniform(-kTilt_rad, kTilt_rad), 0);
-  if (!has_closed_form_inverse(model_)) return std::nullopt;
   for (const double part : {1.0, 0.5, 0.0}) {  // less where the arm does not reach otherwise
     std::optional<JointVector> best;
     for (int i = 0; i < kTurns; ++i) {

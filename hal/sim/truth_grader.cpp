@@ -143,12 +143,13 @@ double TruthGrader::false_occupied_fraction(const FinalClaims& claims) const {
   std::vector<std::uint8_t> matter;
   truth_.world->matter(geometry, matter);
   std::size_t asked = 0, wrong = 0;
+  const Capsules placed = place(truth_.arm.body, forward(truth_.arm, truth_.start_rad));
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (!claims.reach_zone.empty() && claims.reach_zone[i] == 0) continue;
     ++asked;
     if (map.voxel_class(i) != VoxelClass::kOccupied) continue;
     const Eigen::Vector3i voxel = geometry.voxel_at(i);
-    const bool base = std::ranges::any_of(truth_.arm.body, [&](const Capsule& capsule) {
+    const bool base = std::ranges::any_of(placed, [&](const Capsule& capsule) {
       const Eigen::Vector3d center_m = geometry.center_m(voxel);
       const double within_m = capsule.radius_m + kSurfaceTolerance * geometry.resolution_m;
       return capsule.link == 0 && segment_distance_m(center_m, center_m, capsule.a, capsule.b) < within_m;

@@ -30,7 +30,7 @@ class MappedWorkshop {
   MappedWorkshop()
       : scene_(load()),
         renderer_(scene_),
-        arm_(*find_arm_model(scene_.arm_model)),
+        arm_(scene_.arm),
         body_(body_with_camera(arm_, scene_.mount.flange_T_camera())),
         clearance_(required_clearance({.voxel_m = kResolution_m}).clearance()),
         geometry_(GridGeometry::covering({-1.5, -1.5, -0.3}, {1.5, 1.5, 1.5}, kResolution_m)),

@@ -33,7 +33,7 @@ Config all_changed() {
   c.seed = 9007199254740992;
   c.workers = 4;
   c.start_source = "panel";
-  c.arm = {"ur10e", 0.1 + 0.2, 1.0 / 3.0, 2.5};
+  c.arm = {"ur10e", "my arm.urdf", "torso", "tool0", "wrist_1", "tilted", 0.1 + 0.2, 1.0 / 3.0, 2.5};
   c.safe_zone = {0.7, 0.9};
   c.cart = {-0.123456789012345};
   c.base_allowance = {0.2, 0.1};

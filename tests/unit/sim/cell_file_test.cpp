@@ -30,7 +30,7 @@ TEST_CASE("every built-in cell loads, and its board can be calibrated from the s
     REQUIRE(scene);
     CHECK(scene->name == cell.name);
     CHECK(scene->solids[scene->boards.front().solid].name == "board");
-    CHECK(scene->safe_zone.floor_m == -0.02);
+    CHECK(scene->safe_zone.floor_m == (cell.name == "pr2_like" ? -0.42 : -0.02));
     // About 7 % of random configurations stand in the zone, 1 % of these see the board: 240 of 20,000 measured.
     CHECK(board_views(*scene, 60000, 1).size() >= 30);
   }
@@ -67,7 +67,7 @@ TEST_CASE("a cell file says where the arm, the mount and the things are") {
                      "keep_out:\n  - {name: people, low_m: [-2, 1, -1], high_m: [2, 2, 2]}\n",
                  "cell.yaml", 1);
   REQUIRE(scene);
-  CHECK(scene->arm_model == "ur5e");
+  CHECK(scene->arm.name == "ur5e");
   CHECK(scene->safe_zone.floor_m == -0.05);
   CHECK(scene->mount.link_T_camera.translation() == Eigen::Vector3d(0.01, 0.02, 0.03));
   CHECK(scene->keep_out.size() == 1);
@@ -80,6 +80,36 @@ TEST_CASE("a cell file says where the arm, the mount and the things are") {
   CHECK((board * scene->boards.front().spec.center()).isApprox(Eigen::Vector3d(0.9, 0, 0.3)));
   CHECK(board.rotation().col(2).isApprox(Eigen::Vector3d(1, 0, -0.3).normalized()));
   CHECK(board.rotation().col(1).z() < -0.9);  // rows go down
+}
+
+TEST_CASE("a cell's arm may come from a file, and another may take its place") {
+  ArmModel read = *find_arm_model("pr2_like");
+  read.name = "mine";
+  std::string asked;
+  const auto load = [&](const std::string& path) -> Result<ArmModel> {
+    asked = path;
+    if (path.ends_with("bad.yaml")) return failure(Fault::kConfigBadValue, "bad.yaml:3: no arm");
+    return read;
+  };
+  const std::string own = kBoard + "arm: mine.urdf\nstart_deg: [0, 20, -60, -90, 0, -50, 0]\ncart: {top_m: -0.42}\n";
+  const auto scene = parse_cell(own, "cells/cell.yaml", 1, {.file = {}, .load = load});
+  REQUIRE(scene);
+  CHECK(asked == "cells/mine.urdf");
+  CHECK(scene->arm.name == "mine");
+  CHECK(scene->arm_file == "cells/mine.urdf");
+  CHECK(scene->start_rad.size() == 7);
+  CHECK(scene->mount.link == 7);
+  const auto other = parse_cell(kBoard + "arm: ur5\nstart_deg: [1, 2, 3, 4, 5, 6]\ncamera: {link: 6}\n", "cell.yaml", 1,
+                                {.file = "other.yaml", .load = load});
+  REQUIRE(other);
+  CHECK(asked == "other.yaml");
+  CHECK(other->start_rad == read.start_rad);
+  CHECK(other->mount.link == 7);
+  const auto bad = parse_cell(kBoard, "cell.yaml", 1, {.file = "bad.yaml", .load = load});
+  REQUIRE_FALSE(bad);
+  CHECK(bad.error().detail() == "bad.yaml:3: no arm");
+  CHECK(parse_cell(own, "cell.yaml", 1).error().fault == Fault::kCellInvalid);
+  CHECK(load_cell("random:3", 1, {.file = "other.yaml", .load = load}).error().fault == Fault::kCellInvalid);
 }
 
 TEST_CASE("a wrong cell file is refused with place and reason") {

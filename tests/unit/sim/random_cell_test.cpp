@@ -21,7 +21,7 @@ TEST_CASE("random cells keep the safe zone clear, the start free and the board i
         std::ranges::count_if(scene->solids, [](const Solid& s) { return s.name == "box" || s.name == "cylinder"; });
     CHECK(objects >= 8);  // some may find no place
     CHECK(objects <= 17);
-    const ArmModel arm = *find_arm_model(scene->arm_model);
+    const ArmModel arm = scene->arm;
     for (const Capsule& capsule : place(true_body(arm), forward(arm, scene->start_rad))) {
       if (capsule.link > 1) CHECK_FALSE(touches(*scene, capsule));
     }

@@ -159,7 +159,7 @@ TEST_CASE("a depth image depends on seed and frame alone") {
 TEST_CASE("pictures are the same whatever the number of threads that share their rows") {
   const Result<Scene> scene = load_cell("workshop", 1);
   REQUIRE(scene);
-  const ArmModel arm = *find_arm_model(scene->arm_model);
+  const ArmModel arm = scene->arm;
   const std::vector<JointVector> views = board_views(*scene, 60000, 1);
   REQUIRE_FALSE(views.empty());
   const LinkFrames frames = forward(arm, views[0]);
@@ -185,7 +185,7 @@ TEST_CASE("rendered boards are found, and their corners are where the camera mod
   const Result<Scene> scene = load_cell("workshop", 2);
   REQUIRE(scene);
   const Renderer renderer(*scene);
-  const ArmModel arm = *find_arm_model(scene->arm_model);
+  const ArmModel arm = scene->arm;
   const CameraIntrinsics& camera = scene->mount.color;
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
   std::vector<JointVector> views = board_views(*scene, 60000, 3);
@@ -214,7 +214,7 @@ TEST_CASE("rendered boards are found, and their corners are where the camera mod
 TEST_CASE("observed corners scatter about the truth by their sigma, and are missing when the board is hidden") {
   const Result<Scene> scene = load_cell("empty", 1);
   REQUIRE(scene);
-  const ArmModel arm = *find_arm_model(scene->arm_model);
+  const ArmModel arm = scene->arm;
   const std::vector<JointVector> views = board_views(*scene, 60000, 1);
   REQUIRE_FALSE(views.empty());
   const Transform<Base, Camera> pose = forward(arm, views[0]).flange() * scene->mount.flange_T_camera();
@@ -258,7 +258,7 @@ TEST_CASE("an overview shows the arm") {
   const Result<Scene> scene = load_cell("workshop", 1);
   REQUIRE(scene);
   const Renderer renderer(*scene);
-  const ArmModel arm = *find_arm_model(scene->arm_model);
+  const ArmModel arm = scene->arm;
   const Capsules body = place(true_body(arm), forward(arm, scene->start_rad));
   const Overview with = renderer.render_overview({-1.5, -1.7, 1.6}, {0, 0, 0.2}, body, 160, 120);
   const Overview without = renderer.render_overview({-1.5, -1.7, 1.6}, {0, 0, 0.2}, {}, 160, 120);
