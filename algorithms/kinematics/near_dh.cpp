@@ -16,8 +16,9 @@ constexpr std::uint64_t kSeed = 20, kStream = 1601;
 // A milliradian at the flange counts as much as 0.3 mm: what it moves at the board.
 constexpr double kLever_m = 0.3;
 constexpr double kStep = 1e-6;
-// Holds back what the flange does not tell: shifts along parallel axes, and turns that one joint can take for another.
-constexpr double kHold = 1e-6;
+// Weight of the published table against one configuration's flange: keeps what the flange hardly tells, shifts along
+// parallel axes above all, which would take the frames away from the links again.
+constexpr double kHold = 1e-2;
 
 struct Setup {
   ArmModel arm;
@@ -76,19 +77,27 @@ NearDh near_dh(const ArmModel& published, const std::array<DhRow, kJointsMax>& m
     setup.flange.push_back(forward(setup.arm, q).flange().pose());
   }
   const int parameters = 4 * published.joints;
-  ArmModel arm = published;
+  ArmModel arm = published, from = published;
+  const auto away = [&](ArmModel& table) {
+    Eigen::VectorXd change(parameters);
+    for (int i = 0; i < parameters; ++i) change[i] = parameter(table, i) - parameter(from, i);
+    return change;
+  };
   Eigen::VectorXd now = residuals(arm, setup);
+  double cost = now.squaredNorm();
   for (int step = 0; step < kSteps; ++step) {
     const Eigen::MatrixXd j = jacobian(arm, setup, parameters);
     Eigen::MatrixXd normal = j.transpose() * j;
     normal.diagonal().array() += kHold;
-    const Eigen::VectorXd change = normal.ldlt().solve(j.transpose() * now);
+    const Eigen::VectorXd change = normal.ldlt().solve(j.transpose() * now + kHold * away(arm));
     ArmModel next = arm;
     for (int i = 0; i < parameters; ++i) parameter(next, i) -= change[i];
     const Eigen::VectorXd after = residuals(next, setup);
-    if (!(after.squaredNorm() < now.squaredNorm())) break;
+    const double cost_after = after.squaredNorm() + kHold * away(next).squaredNorm();
+    if (!(cost_after < cost)) break;
     arm = next;
     now = after;
+    cost = cost_after;
   }
   NearDh found;
   found.dh = arm.dh;

@@ -25,7 +25,7 @@ class Message {
     for (const char c : words) byte(c);
   }
   void byte(char value) {
-    ENSURE(5301, size_ < N);
+    ENSURE(5391, size_ < N);
     bytes_[size_++] = value;
   }
   [[nodiscard]] std::string_view view() const { return {bytes_.data(), size_}; }
@@ -52,7 +52,7 @@ class Inbox {
     return {bytes_.data() + end_, N - end_};
   }
   void came(std::size_t count) {
-    ENSURE(5302, end_ + count <= N);
+    ENSURE(5392, end_ + count <= N);
     end_ += count;
   }
 
@@ -63,7 +63,7 @@ class Inbox {
 
 /// The big-endian number in `count` bytes from `at` on. The caller has looked at the size.
 [[nodiscard]] inline std::uint64_t number_at(std::string_view bytes, std::size_t at, std::size_t count) {
-  ENSURE(5303, at + count <= bytes.size());
+  ENSURE(5393, at + count <= bytes.size());
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < count; ++i) value = value << 8 | static_cast<std::uint8_t>(bytes[at + i]);
   return value;

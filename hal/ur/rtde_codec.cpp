@@ -140,7 +140,7 @@ Result<RtdeRecipe> rtde_recipe(int protocol, std::string_view payload, std::stri
 }
 
 Status rtde_values(const RtdeRecipe& recipe, std::string_view payload, std::span<double> values) {
-  ENSURE(5304, values.size() >= recipe.values());
+  ENSURE(5394, values.size() >= recipe.values());
   const bool other = recipe.numbered && !payload.empty() && static_cast<std::uint8_t>(payload[0]) != recipe.number;
   if (payload.size() != recipe.data_bytes() || other) {
     return failure(Fault::kLinkLost, "RTDE: {} bytes of data, {} expected of recipe {}", payload.size(),
