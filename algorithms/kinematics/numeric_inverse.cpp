@@ -211,8 +211,11 @@ InverseSolutions inverse_of(const ArmModel& arm, const Transform<Base, Flange>& 
 InverseSolutions inverse_looking(const ArmModel& arm, const Pose& flange_T_sensor, const Pose& base_T_sensor,
                                  double distance_m, const JointVector& reference_rad) {
   if (arm.joints >= 6) {
-    return inverse_of(arm, Transform<Base, Flange>(base_T_sensor * flange_T_sensor.inverse(Eigen::Isometry)),
-                      reference_rad);
+    const Transform<Base, Flange> base_T_flange(base_T_sensor * flange_T_sensor.inverse(Eigen::Isometry));
+    if (has_closed_form_inverse(arm)) return inverse(arm, base_T_flange, reference_rad);
+    // Callers have many places to look from: one that takes long is given up.
+    return inverse_numeric(arm, base_T_flange, reference_rad,
+                           {.starts_max = 3, .iterations_max = 30, .solutions_max = 2});
   }
   AimGoal near{.flange_T_sensor = flange_T_sensor,
                .point = base_T_sensor * Vector3d(0, 0, distance_m),

@@ -81,16 +81,17 @@ Json robot_json(const RobotRecord& robot) {
   Json checksums = Json::array(), rows = Json::array();
   for (const std::uint32_t checksum : robot.kinematics_checksums) checksums.push_back(fmt::format("{:08x}", checksum));
   for (const DhRow& row : robot.dh) {
-    rows.push_back(
-        {{"theta_rad", row.theta_offset_rad}, {"d_m", row.d_m}, {"a_m", row.a_m}, {"alpha_rad", row.alpha_rad}});
+    rows.push_back({{"theta_rad", row.theta_offset_rad},
+                    {"d_m", row.d_m},
+                    {"a_m", row.a_m},
+                    {"alpha_rad", row.alpha_rad},
+                    {"beta_rad", row.beta_rad},
+                    {"gamma_rad", row.gamma_rad}});
   }
   return {{"model", robot.model},
           {"software", robot.software},
           {"serial", robot.serial.empty() ? Json(nullptr) : Json(robot.serial)},
-          {"kinematics",
-           {{"checksums", checksums},
-            {"dh", rows},
-            {"fit", robot.fit ? Json{{"rms_m", robot.fit->rms_m}, {"rms_rad", robot.fit->rms_rad}} : Json(nullptr)}}},
+          {"kinematics", {{"checksums", checksums}, {"dh", rows}}},
           {"play_to_consent_s", robot.consent_s},
           {"segment_begins_within_s", robot.accept_s},
           {"stop_stands_within_s", robot.stop_s},

@@ -270,12 +270,7 @@ struct RobotRecord {
   std::string software;  ///< "3.15.8"
   std::string serial;    ///< empty: the controller is too old to tell
   std::array<std::uint32_t, 6> kinematics_checksums{};
-  std::array<DhRow, 6> dh{};  ///< with the factory's correction; what the arm model of the run had
-  /// Where the factory's table has frames far from the links, `dh` is fitted: what it lacks at the flange, RMS.
-  struct Fit {
-    double rms_m = 0, rms_rad = 0;
-  };
-  std::optional<Fit> fit;
+  std::array<DhRow, 6> dh{};  ///< with the factory's correction: the arm model of the run
   double consent_s = 0;       ///< the longest from the program's connection until it could be moved
   double accept_s = 0;        ///< and from a segment's command until the program had begun it
   double stop_s = 0;          ///< and from a command to stop until the arm stood

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "algorithms/kinematics/factory_kinematics.hpp"
 #include "hal/ur/modes.hpp"
 
 namespace firstlook {
@@ -51,40 +52,29 @@ Result<std::unique_ptr<NetworkArm>> NetworkArm::connect(const Config& config, Na
   const ur::RobotIdentity& identity = arm->robot_->identity();
   auto measured = measure(identity, config);
   if (!measured) return std::unexpected(measured.error());
-  arm->measured_ = *measured;
+  arm->model_ = *measured;
   narrator.line(fmt::format("robot     {} at {}, serial number {}, kinematics as its factory measured them",
                             config.arm.model, config.robot.host, identity.serial_number()));
-  if (const auto& near = arm->measured_.near) {
-    narrator.line(fmt::format(
-        "robot     its frames lie far from the links: taken nearer, the flange is off by {:.2f} mm, {:.2f} mrad RMS",
-        1e3 * near->rms_m, 1e3 * near->rms_rad));
-  }
   return arm;
 }
 
-Result<NetworkArm::MeasuredArm> NetworkArm::measure(const ur::RobotIdentity& robot, const Config& config) {
-  constexpr double kNear_m = 0.02, kNear_rad = 0.05;           // ten times what a factory corrects
-  constexpr double kFitWorst_m = 0.005, kFitWorst_rad = 0.01;  // another arm
-  MeasuredArm arm{find_arm_model(config.arm.model).value(), {}};
-  const std::array<DhRow, kJointsMax> published = arm.model.dh;
-  bool near = true;
+/// The configured model with the kinematics that the robot's factory measured.
+Result<ArmModel> NetworkArm::measure(const ur::RobotIdentity& robot, const Config& config) {
+  constexpr double kOff_m = 0.02, kOff_rad = 0.05;  // ten times what a factory corrects
+  const ArmModel published = find_arm_model(config.arm.model).value();
+  std::array<DhRow, kJointsMax> told{};
   for (std::size_t j = 0; j < robot.kinematics.rows.size(); ++j) {
     const ur::KinematicsRow& row = robot.kinematics.rows[j];
-    arm.model.dh[j] = {row.theta_rad, row.d_m, row.a_m, row.alpha_rad};
-    near = near && std::abs(row.d_m - published[j].d_m) < kNear_m && std::abs(row.a_m - published[j].a_m) < kNear_m &&
-           std::abs(row.theta_rad - published[j].theta_offset_rad) < kNear_rad &&
-           std::abs(row.alpha_rad - published[j].alpha_rad) < kNear_rad;
+    told[j] = {row.theta_rad, row.d_m, row.a_m, row.alpha_rad};
   }
-  if (near) return arm;
-  arm.near = near_dh(find_arm_model(config.arm.model).value(), arm.model.dh);
-  arm.model.dh = arm.near->dh;
-  if (arm.near->worst_m > kFitWorst_m || arm.near->worst_rad > kFitWorst_rad) {
-    return failure(
-        Fault::kConfigBadValue,
-        "robot at {}: its kinematics are not those of a {}: the flange would be off by {:.1f} mm, {:.1f} mrad",
-        config.robot.host, arm.model.name, 1e3 * arm.near->worst_m, 1e3 * arm.near->worst_rad);
+  const MeasuredArm measured = with_factory_axes(published, told);
+  if (measured.frames_off_m > kOff_m || measured.frames_off_rad > kOff_rad) {
+    return failure(Fault::kConfigBadValue,
+                   "robot at {}: its kinematics are not those of a {}: a link would be off by {:.1f} mm, {:.1f} mrad",
+                   config.robot.host, published.name.view(), 1e3 * measured.frames_off_m,
+                   1e3 * measured.frames_off_rad);
   }
-  return arm;
+  return measured.arm;
 }
 
 hal::DeviceReport NetworkArm::report(Instant) const {
@@ -117,8 +107,7 @@ RobotRecord NetworkArm::record(Narrator& narrator) const {
   record.software = fmt::format("{}.{}.{}", identity.version.major, identity.version.minor, identity.version.bugfix);
   record.serial = identity.serial_number();
   record.kinematics_checksums = identity.kinematics.checksums;
-  std::copy_n(measured_.model.dh.begin(), record.dh.size(), record.dh.begin());
-  if (measured_.near) record.fit = {measured_.near->rms_m, measured_.near->rms_rad};
+  std::copy_n(model_.dh.begin(), record.dh.size(), record.dh.begin());
   record.consent_s = delays.consent_s;
   record.accept_s = delays.accept_s;
   record.stop_s = delays.stop_s;

@@ -2,11 +2,9 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "algorithms/kinematics/arm_model.hpp"
-#include "algorithms/kinematics/near_dh.hpp"
 #include "app/config/config.hpp"
 #include "app/report/run_record.hpp"
 #include "hal/api/device_report.hpp"
@@ -27,7 +25,7 @@ class NetworkArm final : public hal::ReportingDevice {
 
   [[nodiscard]] hal::RobotArm& arm() { return robot_->robot(); }
   [[nodiscard]] hal::Pendant& pendant() { return robot_->robot().pendant(); }
-  [[nodiscard]] const ArmModel& model() const { return measured_.model; }
+  [[nodiscard]] const ArmModel& model() const { return model_; }
 
   /// Which robot it is, and what keeps it from moving.
   [[nodiscard]] hal::DeviceReport report(Instant now) const override;
@@ -36,17 +34,12 @@ class NetworkArm final : public hal::ReportingDevice {
 
  private:
   class Notices;
-  /// The configured model with the kinematics that the robot's factory measured.
-  struct MeasuredArm {
-    ArmModel model;
-    std::optional<NearDh> near;  ///< where the measured frames lie far from the links
-  };
   NetworkArm();
-  [[nodiscard]] static Result<MeasuredArm> measure(const ur::RobotIdentity& robot, const Config& config);
+  [[nodiscard]] static Result<ArmModel> measure(const ur::RobotIdentity& robot, const Config& config);
 
   std::unique_ptr<Notices> notices_;
   std::unique_ptr<ur::NetworkRobot> robot_;
-  MeasuredArm measured_;
+  ArmModel model_;
   std::string host_;
 };
 

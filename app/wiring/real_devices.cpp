@@ -217,12 +217,16 @@ Result<RealDevices> open_real_devices(const Config& config) {
     const Status opened = take(openni::OpenNiDepth::make(kernel(), *options), devices.depth, devices);
     if (!opened) return std::unexpected(opened.error());
   }
-  if (config.panel.can_interface == "none") {
-    (void)take<NoPanel>(std::make_unique<NoPanel>(), devices.panel, devices);
-  } else {
-    (void)take<can::CanPanel>(make_panel(config), devices.panel, devices);
-  }
+  std::shared_ptr<hal::Panel> panel = open_panel(config);
+  if (!panel) panel = std::make_shared<NoPanel>();
+  devices.panel = panel.get();
+  devices.owned.push_back(std::move(panel));
   return devices;
+}
+
+std::shared_ptr<hal::Panel> open_panel(const Config& config) {
+  if (config.panel.can_interface == "none") return nullptr;
+  return make_panel(config);
 }
 
 Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {

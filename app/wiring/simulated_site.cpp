@@ -3,6 +3,7 @@
 #include "app/wiring/cell_grading.hpp"
 #include "app/wiring/job_site.hpp"
 #include "app/wiring/network_arm.hpp"
+#include "app/wiring/real_devices.hpp"
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 #include "hal/sim/ur_controller/truth_reader.hpp"
 
@@ -12,19 +13,19 @@ namespace {
 class SimulatedSite final : public JobSite {
  public:
   SimulatedSite(std::unique_ptr<sim::ur::TruthReader> truth, std::unique_ptr<sim::SimulatedCell> cell,
-                std::unique_ptr<NetworkArm> arm)
-      : truth_(std::move(truth)), cell_(std::move(cell)), arm_(std::move(arm)) {}
+                std::unique_ptr<NetworkArm> arm, std::shared_ptr<hal::Panel> panel)
+      : truth_(std::move(truth)), cell_(std::move(cell)), arm_(std::move(arm)), panel_(std::move(panel)) {}
   ~SimulatedSite() override { cell_->grader().watch(nullptr); }
 
   CartDevices devices() override {
     return {arm_ ? arm_->arm() : cell_->arm(), cell_->color(), cell_->depth(),
-            arm_ ? arm_->pendant() : cell_->pendant(), cell_->panel()};
+            arm_ ? arm_->pendant() : cell_->pendant(), panel_ ? *panel_ : cell_->panel()};
   }
   CellFacts facts() const override {
     const sim::CellDescription& cell = cell_->description();
     return {cell.start_rad, cell.camera_T_depth, {}, arm_ ? arm_->model() : cell.arm};
   }
-  bool in_real_time() const override { return arm_ != nullptr; }
+  bool in_real_time() const override { return arm_ != nullptr || panel_ != nullptr; }
   void begin(const PublishedSpace& space) override {
     known_free_.emplace(space);
     cell_->grader().watch(&*known_free_);
@@ -40,6 +41,7 @@ class SimulatedSite final : public JobSite {
   std::unique_ptr<sim::ur::TruthReader> truth_;
   std::unique_ptr<sim::SimulatedCell> cell_;
   std::unique_ptr<NetworkArm> arm_;
+  std::shared_ptr<hal::Panel> panel_;  ///< a real one in place of the cell's
   std::optional<KnownFree> known_free_;
 };
 
@@ -79,7 +81,7 @@ Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, 
     if (!connected) return std::unexpected(connected.error());
     arm = std::move(*connected);
   }
-  return std::make_unique<SimulatedSite>(std::move(truth), std::move(*cell), std::move(arm));
+  return std::make_unique<SimulatedSite>(std::move(truth), std::move(*cell), std::move(arm), open_panel(config));
 }
 
 }  // namespace firstlook

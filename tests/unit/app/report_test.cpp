@@ -273,7 +273,7 @@ TEST_CASE("hostile text stays text", "[report]") {
   record.safety->stops[0].cause = evil;
   record.memory->pools[0].name = evil;
   record.faults[0].detail = evil;
-  record.provenance = {evil, evil, evil, evil, evil};
+  record.provenance = {.version = evil, .arm_model = evil, .sensor = evil, .config_yaml = evil, .journal_hash = evil};
   record.wall.started = record.wall.folder = evil;
   const std::string page = report_html(record);
   CHECK(page.find("<script") == std::string::npos);

@@ -219,7 +219,11 @@ RunRecord make_record() {
                            {"depth frames", 4u << 20, 4u << 20},
                            {"heap of jobs", 128u << 20, 128u << 20, true}}};
   r.faults = {{151.2, Fault::kProgramStopped, "program stopped on the pendant"}};
-  r.provenance = {"0.1.0", "ur5", "full", "cell: workshop\n", "77aa01"};
+  r.provenance = {.version = "0.1.0",
+                  .arm_model = "ur5",
+                  .sensor = "full",
+                  .config_yaml = "cell: workshop\n",
+                  .journal_hash = "77aa01"};
   r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
             "runs/20260131-7",      2};
   r.alignment = alignment();
