@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
+#include <memory>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace firstlook::openni {
 namespace {
@@ -146,10 +149,24 @@ void Sensor::hold_still() {
   info_.vertical_fov_rad = depth.getVerticalFieldOfView();
 }
 
+/// Debian's player of recordings (2.2.0.33) has a thread that goes on reading while its device is closed, and then
+/// crashes: one time in ten. A recording is told to wait ("on demand") and stays open as long as the program.
+void Sensor::keep_open() {
+  static auto* const recordings = new std::vector<std::unique_ptr<Library>>;  // not closed at the end, either
+  if (::openni::PlaybackControl* playback = library_->device.getPlaybackControl(); playback != nullptr)
+    (void)playback->setSpeed(-1);
+  recordings->push_back(std::move(library_));
+  library_ = std::make_unique<Library>();
+}
+
 void Sensor::close() {
   library_->frame.release();
   if (library_->listens) OpenNI::removeDeviceDisconnectedListener(&library_->unplugging);
   library_->listens = false;
+  if (library_->device.isValid() && library_->device.isFile()) {
+    keep_open();
+    return;
+  }
   if (library_->depth.isValid()) {
     library_->depth.stop();
     library_->depth.destroy();

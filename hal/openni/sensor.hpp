@@ -73,6 +73,7 @@ class Sensor {
   SensorTrouble fail(SensorTrouble trouble);
   [[nodiscard]] bool choose_mode(const SensorOptions& options);
   void hold_still();
+  void keep_open();
 
   std::unique_ptr<Library> library_;
   SensorInfo info_;

@@ -75,7 +75,21 @@ Config all_changed() {
                    4};
   c.camera = {"/dev/v4l/by-id/usb-046d_0990-index0", 800, 600, "MJPG", 15, 5000, 3, 40, 4600, "camera_info.yaml"};
   c.panel = {"vcan0", 5, 0x80000001, 4294967295, 8, 9, 10, -1, "closes", 4, 5, 6, 7};
-  c.depth = {"stereo", 0.4, 6, 3.5, 0.001, 0.003, 0.06, 4, 0.03, 5, "cell.oni", "depth_info.yaml"};
+  c.depth = {"stereo",
+             0.4,
+             6,
+             3.5,
+             0.001,
+             0.003,
+             0.06,
+             4,
+             0.03,
+             5,
+             "cell.oni",
+             "depth_info.yaml",
+             {-0.025, 0.001, 0.002},
+             {0.5, -0.3, 180}};
+  c.robot = {"192.168.56.101", "192.168.56.1", 50012, 50011, 100, 1.25};
   c.map = {0.02, {-1, -1, 0},    {1, 1, 1},       60,   30,   0.002,         "clear_when_corroborated",
            0.01, {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, -0.8, 0.03, "color,label", "earlier/map.ot"};
   c.explore = {61, 401, 2001, 9, 3, "thesis2014"};
