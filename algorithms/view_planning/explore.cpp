@@ -15,12 +15,13 @@ constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each ca
 // states with less than 1 mm trap the arm).
 constexpr double kTargetMargin_m = 0.005;
 constexpr std::uint64_t kRefineStream = 4600ULL << 40;
-constexpr double kAside_rad = 0.12;   // standard deviation of each joint in a step of refinement
-constexpr double kBackMax = 0.4;      // of the way to where the arm is, in every other step
-constexpr double kNearby_rad = 0.35;  // standard deviation of each joint around an earlier view
-constexpr double kHereShare = 0.25;   // of those: around where the arm is, which has just seen something new
-constexpr int kAimedTries = 10;       // for one of another source: most are given up before they cost anything
-constexpr int kInVainMax = 2;         // views in a row that make room for motion, and nothing comes of it
+constexpr double kRefinedMargin_m = 0.015;  // steps lead towards what hides the rest, and a look there finds more of it
+constexpr double kAside_rad = 0.12;         // standard deviation of each joint in a step of refinement
+constexpr double kBackMax = 0.4;            // of the way to where the arm is, in every other step
+constexpr double kNearby_rad = 0.35;        // standard deviation of each joint around an earlier view
+constexpr double kHereShare = 0.25;         // of those: around where the arm is, which has just seen something new
+constexpr int kAimedTries = 10;             // for one of another source: most are given up before they cost anything
+constexpr int kInVainMax = 2;               // views in a row that make room for motion, and nothing comes of it
 constexpr double kStandOffMin_m = 0.6;
 constexpr double kStandOffMax_m = 1.5;
 constexpr double kAimCone_rad = 1.2;  // about the direction from unknown to free: 70 degrees, beyond it is grazing
@@ -212,7 +213,7 @@ void ViewChooser::refine(const Task& task, RunParallel run_parallel) {
         const double q_rad = best.q[j] + back * (task.current[j] - best.q[j]) + kAside_rad * random.normal();
         tried.q[j] = std::clamp(q_rad, c.arm.lower_rad[i] + kLimitMargin_rad, c.arm.upper_rad[i] - kLimitMargin_rad);
       }
-      tried.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, tried.q, kTargetMargin_m);
+      tried.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, tried.q, kRefinedMargin_m);
       if (tried.free) evaluate(task, tried, workers_[static_cast<std::size_t>(worker)]);
       best.tries = tried.tries;
       if (tried.utility_per_s > best.utility_per_s) best = tried;

@@ -1,6 +1,7 @@
 #include "algorithms/view_planning/gain.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "algorithms/kinematics/self_collision.hpp"
@@ -23,6 +24,13 @@ bool needs_again(const ViewContext& context, std::size_t index) {
   if (context.map.blocked(index) || context.map.holds_surface(index)) return false;
   return context.space.field->values()[index] <= 0 ||
          context.map.expires(index, context.fresh_until_s, context.free_max_age_s);
+}
+
+/// A free voxel of which a surface fills so many octants that what lies behind is mostly the inside of things. One with
+/// fewer is an edge, of an opening too, and rays pass beside it.
+bool hides_what_is_behind(const VoxelMap& map, std::size_t index) {
+  constexpr int kOctantsMin = 3;
+  return std::popcount(map.octants(index).surface) >= kOctantsMin;
 }
 
 /// Whether a capsule in base coordinates can come between the sensor and any of its rays: it is not the sensor's own
@@ -86,7 +94,7 @@ void GainModel::prepare(const ViewContext& context) {
         if (counts && needs_backing(i)) backed_only_m_.extend(geometry_.center_m(geometry_.voxel_at(i)));
         break;
       case VoxelClass::kFree:
-        if (context.map.holds_surface(i)) {
+        if (hides_what_is_behind(context.map, i)) {
           plane[i] = kOpaque;
         } else {
           const bool again = counts && futile_.count(i) < sampling_.again_futile_max && needs_again(context, i);
@@ -206,7 +214,7 @@ GainModel::Passed GainModel::pass_with_backing(const ViewContext& context, const
   if (!Eigen::AlignedBox3d(eye.cwiseMin(end), eye.cwiseMax(end)).intersects(backed_only_m_)) return passed;
   walk_ray(geometry_, eye, end, [&](std::size_t i, double entry) {
     const VoxelClass voxel = context.map.voxel_class(i);
-    if (voxel == VoxelClass::kOccupied || context.map.holds_surface(i)) return false;
+    if (voxel == VoxelClass::kOccupied || hides_what_is_behind(context.map, i)) return false;
     if (voxel == VoxelClass::kFree || entry * depth_m < sensor_.range_min_m) return true;
     if (futile_.backed(i) >= sampling_.futile_max) return false;
     if (context.zone[i] != 0 && needs_backing(i) && !passed.full()) passed.push_back(static_cast<std::uint32_t>(i));

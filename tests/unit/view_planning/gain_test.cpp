@@ -173,7 +173,12 @@ TEST_CASE("a voxel that a surface half fills hides what is behind it", "[gain]")
   GainWorker worker = model.worker();
   model.prepare(world.context());
   REQUIRE(model.count(world.context(), world.q, worker).unknown > 50);
-  for (const std::size_t i : layer) world.map.note_surface(i, 0);
+  for (const std::size_t i : layer) world.map.note_surface(i, 0);  // edges
+  model.prepare(world.context());
+  CHECK(model.count(world.context(), world.q, worker).unknown > 50);
+  for (const std::size_t i : layer) {
+    for (const unsigned octant : {1U, 2U}) world.map.note_surface(i, octant);
+  }
   model.prepare(world.context());
   CHECK(model.count(world.context(), world.q, worker).unknown == 0);
 }
