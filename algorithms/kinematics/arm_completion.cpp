@@ -14,12 +14,14 @@ namespace {
 
 constexpr std::uint64_t kStream = 4030;  // of random numbers
 constexpr int kPairSamples = 2000;       // postures in which pairs of capsules are looked at
-constexpr int kStartSamples = 20000;
+constexpr int kStartSamples = 60000;
 constexpr double kZoneRadius_m = 0.5;   // the default safe zone
 constexpr double kZoneHeight_m = 1.13;  // of its top in Base
 constexpr double kEnvelope_m = 0.20;    // at the flange
 constexpr double kRoom_m = 0.03;        // beyond that nothing is gained by more room
 constexpr double kSelfMin_m = 0.02;
+constexpr int kBracketSides = 8;  // of the flange, to which the camera's bracket may point
+constexpr double kBracket_m = 0.10, kBracketRadius_m = 0.03;
 constexpr double kTurnsMax_rad = 4 * std::numbers::pi + 1e-9;  // more is no arm's range
 constexpr double kLengthMax_m = 5;
 constexpr double kSpeedMax_rad_s = 20;
@@ -35,8 +37,27 @@ JointVector random_posture(const ArmModel& arm, Random& random) {
   return q;
 }
 
-/// How much a posture lacks to be a start: 0 when body and envelope stand in the default safe zone with room to spare
-/// and the flange looks outwards and a little down, as a camera on it should.
+/// How much room a bracket lacks that stands out from the flange to any side: once the camera's place is known it is
+/// held apart from the links two before the last, and a start that leaves it no room traps the arm.
+double bracket_lack_m(const LinkFrames& frames, const Capsules& body) {
+  double lack_m = 0;
+  const Pose flange = frames.flange().pose();
+  for (int side = 0; side < kBracketSides; ++side) {
+    const double angle_rad = 2 * std::numbers::pi * side / kBracketSides;
+    const Capsule bracket{
+        flange.translation(),
+        flange * Eigen::Vector3d(kBracket_m * std::cos(angle_rad), kBracket_m * std::sin(angle_rad), 0),
+        kBracketRadius_m};
+    for (const Capsule& part : body) {
+      if (frames.joints - part.link < 2) continue;
+      lack_m = std::max(lack_m, kSelfMin_m - (capsule_distance_m(part, bracket) + kBodyPadding_m));
+    }
+  }
+  return lack_m;
+}
+
+/// How much a posture lacks to be a start: 0 when body and envelope stand in the default safe zone with room to spare,
+/// a bracket on the flange clears the arm, and the flange looks outwards and a little down, as a camera on it should.
 double start_cost(const ArmModel& arm, const JointVector& q, const SelfPairs& pairs) {
   const LinkFrames frames = forward(arm, q);
   const Capsules body = place(arm.body, frames);
@@ -57,7 +78,7 @@ double start_cost(const ArmModel& arm, const JointVector& q, const SelfPairs& pa
   const Eigen::Vector3d wanted = (out.norm() > 1e-6 ? Eigen::Vector3d(out.normalized()) : Eigen::Vector3d::UnitX()) -
                                  0.35 * Eigen::Vector3d::UnitZ();
   const double looks = 1 - wanted.normalized().dot(frames.flange().rotation().col(2));
-  return 20 * self_lack_m + 5 * worst_m + 0.3 * looks;
+  return 20 * (self_lack_m + bracket_lack_m(frames, body)) + 5 * worst_m + 0.3 * looks;
 }
 
 std::string name_of(std::span<const std::string> names, std::size_t i) {

@@ -19,6 +19,19 @@ TEST_CASE("an arm with seven joints beside a torso calibrates and maps, touching
   CHECK(folder.run({"replay", "out/journal.flj"}).exit_code == 0);
 }
 
+TEST_CASE("an arm from a file does the whole job", "[scenario]") {
+  const JobFolder folder;
+  folder.write("cart.yaml", "arm: {file: " FIRSTLOOK_SOURCE_DIR "/app/config/example_arm.yaml}\n");
+  const auto run = folder.run(
+      {"run", "--cell", "empty", "--seed", "4", "--sensor", "fast", "--config", "cart.yaml", "--out", "out"});
+  INFO(run.err);
+  CHECK(run.exit_code == 0);
+  const Json result = folder.read_json("out/result.json");
+  test::check_safe(result);
+  CHECK(result["outcome"] == "done");
+  CHECK(result["truth"]["coverage_of_observable"] > 0.95);
+}
+
 TEST_CASE("the thesis's two-joint arm ends safely and says what its few views leave open", "[scenario]") {
   const JobFolder folder;
   const auto run = folder.run({"run", "--cell", "two_joint", "--seed", "1", "--sensor", "fast", "--out", "out"});

@@ -9,6 +9,7 @@
 #include "algorithms/kinematics/capsule_fit.hpp"
 #include "algorithms/kinematics/inverse_kinematics.hpp"
 #include "algorithms/kinematics/self_collision.hpp"
+#include "algorithms/motion/body.hpp"
 #include "app/config/mesh_points.hpp"
 #include "platform/core/random.hpp"
 
@@ -315,6 +316,23 @@ TEST_CASE("the example table reads, and is the arm that it says", "[arm_file]") 
   CHECK(again->arm.start_rad == arm.start_rad);
   CHECK(parse_arm_yaml(replaced(example_yaml(), "\nname: example", "\n"), "some/where/my_robot.yml")->arm.name ==
         "my_robot");
+}
+
+TEST_CASE("where an arm starts, a camera fits on its flange whatever side the bracket points to", "[arm_file]") {
+  const std::string without_start = replaced(ur5_urdf(), "my_ur5", "my_other");
+  for (const auto& read :
+       {parse_arm_yaml(example_yaml(), "example_arm.yaml"), parse_arm_urdf(without_start, "my_other.urdf", ".")}) {
+    REQUIRE(read);
+    const ArmModel& arm = read->arm;
+    for (int side = 0; side < 8; ++side) {
+      const double angle_rad = side * kPi / 4;
+      const Transform<Flange, Camera> flange_T_camera(
+          Eigen::Quaterniond::Identity(), Vector3d(0.07 * std::cos(angle_rad), 0.07 * std::sin(angle_rad), 0.06));
+      const Body body = body_with_camera(arm, flange_T_camera);
+      INFO(arm.name.view() << " side " << side);
+      CHECK(self_margin_m(place(body.capsules, forward(arm, default_start(arm))), body.self_pairs) > 0);
+    }
+  }
 }
 
 TEST_CASE("a table that is no arm is refused with the place and the likely mistake", "[arm_file]") {

@@ -6,28 +6,15 @@
 
 #include "platform/linux/files.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/sample_calibration.hpp"
 
 namespace firstlook {
 namespace {
 namespace fs = std::filesystem;
 
 StoredCalibration sample(double x_m) {
-  StoredCalibration c;
-  c.accepted = true;
-  c.arm_model = "ur5";
-  c.kinematics = kinematics_checksum(*find_arm_model("ur5"));
-  c.flange_T_camera =
-      Transform<Flange, Camera>(Eigen::Quaterniond(0.99, 0.1, -0.02, 0.03).normalized(), {x_m, 0, 0.06});
-  c.covariance = 1e-8 * Matrix6d::Identity();
-  c.corner_sigma_px = 0.025;
-  c.arm_sigma = {1.1e-4, 1.9e-4};
-  c.intrinsics = {640, 480, 537.33, 538.35, 321.61, 252.18, 0, 0, 0, 0, 0};
-  c.solver = "park-martin";
-  c.views = 15;
-  c.views_given = 16;
-  c.reprojection_rms_px = 0.024;
-  c.holdout_rms_px = 0.16;
-  c.usable_distance_m = 28.4;
+  StoredCalibration c = sample_calibration();
+  c.flange_T_camera = Transform<Flange, Camera>(c.flange_T_camera.quaternion(), {x_m, 0, 0.06});
   return c;
 }
 

@@ -7,33 +7,12 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/unit/app/sample_calibration.hpp"
+
 using namespace firstlook;
 using Catch::Matchers::Contains;
 
 namespace {
-
-StoredCalibration sample() {
-  StoredCalibration c;
-  c.accepted = true;
-  c.arm_model = "ur5";
-  c.kinematics = kinematics_checksum(*find_arm_model("ur5"));
-  c.flange_T_camera = Transform<Flange, Camera>(Eigen::Quaterniond(0.99, 0.1, -0.02, 0.03), {0.001, -0.07, 0.06});
-  Matrix6d root = 1e-4 * Matrix6d::Identity();
-  root(3, 1) = 0.4e-4;
-  root(5, 0) = -0.3e-4;
-  c.covariance = root * root.transpose();
-  c.corner_sigma_px = 0.025;
-  c.arm_sigma = {1.1e-4, 1.9e-4};
-  c.intrinsics = {640, 480, 537.33, 538.35, 321.61, 252.18, 0.17938, -0.31818, -0.00268, 0.00209, 0};
-  c.camera_T_depth = Transform<Camera, Depth>(Eigen::Quaterniond(1, 0.001, 0, 0), {-0.025, 0, 0});
-  c.solver = "park-martin";
-  c.views = 15;
-  c.views_given = 16;
-  c.reprojection_rms_px = 0.024;
-  c.holdout_rms_px = 0.16;
-  c.usable_distance_m = 28.4;
-  return c;
-}
 
 /// A file of this test, gone afterwards.
 class File {
@@ -53,7 +32,7 @@ class File {
 
 /// The sample's text with the line that begins with `key` replaced.
 std::string with_line(const std::string& key, const std::string& line) {
-  std::string text = hand_eye_yaml(sample());
+  std::string text = hand_eye_yaml(sample_calibration());
   const std::size_t at = text.find("\n" + key) + 1;
   REQUIRE(at != std::string::npos + 1);
   return text.replace(at, text.find('\n', at) - at, line);
@@ -75,7 +54,7 @@ std::string refused(const std::string& text, Fault fault = Fault::kDataMalformed
 }
 
 std::string covariance_lines(const Matrix6d& covariance) {
-  StoredCalibration c = sample();
+  StoredCalibration c = sample_calibration();
   c.covariance = covariance;
   return hand_eye_yaml(c);
 }
@@ -83,7 +62,7 @@ std::string covariance_lines(const Matrix6d& covariance) {
 }  // namespace
 
 TEST_CASE("a written calibration reads back whole", "[hand_eye_file]") {
-  const StoredCalibration c = sample();
+  const StoredCalibration c = sample_calibration();
   const File file(hand_eye_yaml(c));
   const auto read = read_hand_eye(file.path());
   if (!read) FAIL(read.error().detail());
@@ -108,7 +87,7 @@ TEST_CASE("a written calibration reads back whole", "[hand_eye_file]") {
 
 TEST_CASE("what a calibration estimated of depth camera and stamps reads back, and is compared as stated",
           "[hand_eye_file]") {
-  StoredCalibration c = sample();
+  StoredCalibration c = sample_calibration();
   const Transform<Camera, Depth> stated(Eigen::Quaterniond::Identity(), {-0.03, 0.001, 0});
   DepthMount mount;
   mount.camera_T_depth = *c.camera_T_depth;
@@ -141,7 +120,7 @@ TEST_CASE("what a calibration estimated of depth camera and stamps reads back, a
 }
 
 TEST_CASE("a calibration that its own run rejected is refused, whatever else it says", "[hand_eye_file]") {
-  StoredCalibration c = sample();
+  StoredCalibration c = sample_calibration();
   c.accepted = false;
   c.covariance(0, 0) = std::numeric_limits<double>::quiet_NaN();
   c.holdout_rms_px = 0;
@@ -157,12 +136,12 @@ TEST_CASE("files that are none", "[hand_eye_file]") {
   CHECK_THAT(refused(with_line("verdict", "verdict: {accepted")), Contains(".yaml:"));
   CHECK_THAT(refused(std::string(100'000, 'x')), Contains("65536"));
   // What an older version wrote, or half a file.
-  const std::string whole = hand_eye_yaml(sample());
+  const std::string whole = hand_eye_yaml(sample_calibration());
   CHECK_THAT(refused(whole.substr(0, whole.find("usable_distance_m"))), Contains("no key usable_distance_m"));
 }
 
 TEST_CASE("keys: all of them, once, and no others", "[hand_eye_file]") {
-  const std::string whole = hand_eye_yaml(sample());
+  const std::string whole = hand_eye_yaml(sample_calibration());
   const std::string typo = with_line("verdict", "verdikt: accepted");
   CHECK_THAT(refused(typo),
              Contains(fmt::format(":{}:", line_of(typo, "verdikt"))) && Contains("'verdikt'; did you mean verdict?"));
@@ -204,7 +183,7 @@ TEST_CASE("values that cannot be", "[hand_eye_file]") {
 
 TEST_CASE("the pose of the flange in the camera is not taken for the pose of the camera in the flange",
           "[hand_eye_file]") {
-  std::string text = hand_eye_yaml(sample());
+  std::string text = hand_eye_yaml(sample_calibration());
   const auto swap_in = [&](const std::string& from, const std::string& to) {
     const std::size_t at = text.find(from);
     REQUIRE(at != std::string::npos);
@@ -217,7 +196,7 @@ TEST_CASE("the pose of the flange in the camera is not taken for the pose of the
 }
 
 TEST_CASE("each key that is missing is named", "[hand_eye_file]") {
-  const std::string whole = hand_eye_yaml(sample());
+  const std::string whole = hand_eye_yaml(sample_calibration());
   for (const char* key : {"format", "verdict", "arm_model", "kinematics", "parent_frame", "child_frame",
                           "translation_m", "quaternion_xyzw", "sigma_translation_mm", "sigma_rotation_mrad",
                           "corner_sigma_px", "solver", "views", "reprojection_rms_px", "usable_distance_m"}) {
@@ -229,7 +208,7 @@ TEST_CASE("each key that is missing is named", "[hand_eye_file]") {
 }
 
 TEST_CASE("a calibration of recorded data says what it cannot know, and no job takes it for more", "[hand_eye_file]") {
-  StoredCalibration c = sample();
+  StoredCalibration c = sample_calibration();
   c.camera_T_depth.reset();
   const ArmModel arm = *find_arm_model("ur5");
   const auto again = [](const StoredCalibration& calibration) {
@@ -256,26 +235,26 @@ TEST_CASE("a calibration of recorded data says what it cannot know, and no job t
 }
 
 TEST_CASE("a covariance must be one, in metres and radians", "[hand_eye_file]") {
-  Matrix6d c = sample().covariance;
+  Matrix6d c = sample_calibration().covariance;
   c(0, 5) += 1e-9;
   CHECK_THAT(refused(covariance_lines(c)), Contains("not symmetric: row 6 column 1"));
-  c = sample().covariance;
+  c = sample_calibration().covariance;
   c(2, 4) = c(4, 2) = 1.01 * std::sqrt(c(2, 2) * c(4, 4));
   CHECK_THAT(refused(covariance_lines(c)), Contains("not positive definite"));
-  c = sample().covariance;
+  c = sample_calibration().covariance;
   c(1, 1) = 0;
   CHECK_THAT(refused(covariance_lines(c)), Contains("not positive"));
-  c = sample().covariance;
+  c = sample_calibration().covariance;
   c(3, 3) = -c(3, 3);
   CHECK_THAT(refused(covariance_lines(c)), Contains("not positive"));
-  c = 1e6 * sample().covariance;  // mm^2 and mrad^2
+  c = 1e6 * sample_calibration().covariance;  // mm^2 and mrad^2
   CHECK_THAT(refused(covariance_lines(c)), Contains("must be in m^2 and rad^2"));
   CHECK_THAT(refused(with_line("sigma_translation_mm", "sigma_translation_mm: [0.1, 0.2, 0.1]")),
              Contains("one of them was changed"));
 }
 
 TEST_CASE("a calibration belongs to its arm and its cameras", "[hand_eye_file]") {
-  const StoredCalibration c = sample();
+  const StoredCalibration c = sample_calibration();
   const ArmModel arm = *find_arm_model("ur5");
   CHECK(check_belongs(c, arm, c.intrinsics, *c.camera_T_depth));
   const auto why = [&](const ArmModel& a, const CameraIntrinsics& k, const Transform<Camera, Depth>& depth) {
