@@ -1,5 +1,7 @@
 /// firstlook: from the command line to what each command does. With app/wiring the only place that names concrete
 /// devices.
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -82,6 +84,14 @@ int run_ur_sim(const UrSimCommand& command) {
 }
 
 int run_ur_script(const UrScriptCommand& command) {
+  // It becomes part of a program: nothing that ends a string of URScript.
+  const bool address = !command.host.empty() && std::ranges::all_of(command.host, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_' || c == ':';
+  });
+  if (!address) {
+    return fail(
+        failure(Fault::kUsage, "--host '{}' is neither a name nor an address of a computer", command.host).error());
+  }
   const std::string script = ur::control_script(command.host, static_cast<std::uint16_t>(command.port));
   if (command.out == "-") {
     std::fputs(script.c_str(), stdout);

@@ -11,6 +11,7 @@
 #include "hal/openni/openni_depth.hpp"
 #include "hal/v4l2/threaded_camera.hpp"
 #include "platform/linux/system_calls.hpp"
+#include "platform/loop/clock.hpp"
 #include "platform/loop/event.hpp"
 
 namespace firstlook {
@@ -166,6 +167,11 @@ std::unique_ptr<can::CanPanel> make_panel(const Config& config) {
   return std::make_unique<can::CanPanel>(kernel(), panel_options(config.panel));
 }
 
+DeviceCheck panel_check(const Config& config) {
+  return check_of<can::CanPanel>(kPanelRole, config.panel.can_interface, make_panel(config),
+                                 [](can::CanPanel& panel) { return watch_panel(panel, &panel); });
+}
+
 class NoPanel final : public hal::Panel {
  public:
   [[nodiscard]] std::optional<hal::OperatorEvent> poll(Instant) override { return std::nullopt; }
@@ -217,15 +223,26 @@ Result<RealDevices> open_real_devices(const Config& config) {
     const Status opened = take(openni::OpenNiDepth::make(kernel(), *options), devices.depth, devices);
     if (!opened) return std::unexpected(opened.error());
   }
-  std::shared_ptr<hal::Panel> panel = open_panel(config);
-  if (!panel) panel = std::make_shared<NoPanel>();
-  devices.panel = panel.get();
-  devices.owned.push_back(std::move(panel));
+  auto panel = open_panel(config);
+  if (!panel) return std::unexpected(panel.error());
+  if (!*panel) *panel = std::make_shared<NoPanel>();
+  devices.panel = panel->get();
+  devices.owned.push_back(std::move(*panel));
   return devices;
 }
 
-std::shared_ptr<hal::Panel> open_panel(const Config& config) {
+Result<std::shared_ptr<hal::Panel>> open_panel(const Config& config) {
   if (config.panel.can_interface == "none") return nullptr;
+  {
+    const DeviceCheck asked = panel_check(config);
+    RealClock clock;
+    const hal::DeviceReport report = watch_devices({&asked, 1}, clock).front().report;
+    if (report.state != hal::DeviceState::kReady) {
+      return failure(Fault::kDeviceMissing, "panel {}: {}. {}", report.device.view(), report.detail.view(),
+                     report.remedy.view());
+    }
+  }
+  // Another one for the job: the clock of a job begins anew.
   return make_panel(config);
 }
 
@@ -247,8 +264,7 @@ Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {
                               [](openni::OpenNiDepth& camera) { return watch_stream(camera, &camera); }));
   }
   if (config.panel.can_interface != "none") {
-    checks.push_back(check_of<can::CanPanel>(kPanelRole, config.panel.can_interface, make_panel(config),
-                                             [](can::CanPanel& panel) { return watch_panel(panel, &panel); }));
+    checks.push_back(panel_check(config));
   }
   return checks;
 }

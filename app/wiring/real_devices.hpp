@@ -33,8 +33,9 @@ struct RealDevices {
 /// camera_info.yaml that is named, as real_device_checks.
 [[nodiscard]] Result<RealDevices> open_real_devices(const Config& config);
 
-/// The panel alone; null where the configuration names none.
-[[nodiscard]] std::shared_ptr<hal::Panel> open_panel(const Config& config);
+/// The panel alone; null where the configuration names none. Asks it first, which takes a second: its Stop must work
+/// before anything moves. Error: kDeviceMissing when it does not answer, or not as the configuration says.
+[[nodiscard]] Result<std::shared_ptr<hal::Panel>> open_panel(const Config& config);
 
 /// A check of each device that the configuration names; one that cannot even be made says why. Errors: those of a
 /// camera_info.yaml that is named: kDataMissing, kDataMalformed, kConfigBadValue for one of another size.

@@ -37,7 +37,7 @@ Result<std::optional<StoredCalibration>> stored_calibration(RunScope scope, cons
 
 /// With --resume: the run that a power cut ended between its calibration and its end, if there is one.
 std::optional<CutOffRun> run_to_resume(const RunCommand& command, Narrator& narrator) {
-  if (!command.resume || command.scope != RunScope::kEverything) return std::nullopt;
+  if (!command.resume) return std::nullopt;
   std::optional<CutOffRun> cut_off = newest_cut_off_run(kRunsFolder);
   if (cut_off) {
     narrator.line(
@@ -87,6 +87,9 @@ int run_job(const RunCommand& command) {
   Config config = loaded->config;
   Narrator narrator;
   narrator.line(where(command, *loaded));
+  if (command.resume && command.scope != RunScope::kEverything) {
+    return fail(failure(Fault::kUsage, "--resume goes on with the part that a run lacked: it takes no --only").error());
+  }
   auto stored = stored_calibration(command.scope, config);
   if (!stored) return fail(stored.error());
   std::optional<CutOffRun> resumed = run_to_resume(command, narrator);

@@ -75,13 +75,15 @@ Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, 
                                         truth.get(), choice});
   if (!cell) return std::unexpected(cell.error());
   describe_cell((*cell)->description(), config);
+  auto panel = open_panel(config);
+  if (!panel) return std::unexpected(panel.error());
   std::unique_ptr<NetworkArm> arm;
   if (config.robot.given()) {
     auto connected = NetworkArm::connect(config, narrator);
     if (!connected) return std::unexpected(connected.error());
     arm = std::move(*connected);
   }
-  return std::make_unique<SimulatedSite>(std::move(truth), std::move(*cell), std::move(arm), open_panel(config));
+  return std::make_unique<SimulatedSite>(std::move(truth), std::move(*cell), std::move(arm), std::move(*panel));
 }
 
 }  // namespace firstlook

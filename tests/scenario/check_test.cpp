@@ -43,6 +43,16 @@ TEST_CASE("devices that are configured and not there are named with what to do",
   CHECK_THAT(folder.run({"check", "--config", "cart.yaml"}).err, Contains("camera.device"));
 }
 
+TEST_CASE("no job starts without the panel that is configured", "[scenario][check]") {
+  const JobFolder folder;
+  folder.write("cart.yaml", "panel: {can_interface: nocan9}\n");
+  const ProgramResult run = folder.run_job("out", {"--config", "cart.yaml"});
+  INFO(run.err);
+  CHECK(run.exit_code == 4);
+  CHECK_THAT(run.err, Contains("E5001") && Contains("panel nocan9"));
+  CHECK_FALSE(std::filesystem::exists(folder / "out"));
+}
+
 TEST_CASE("a folder without a run makes no bundle", "[scenario][bundle]") {
   const JobFolder folder;
   const ProgramResult run = folder.run({"bundle", "."});

@@ -17,6 +17,13 @@ board: {center_m: [0.89, 0.45, 0.42], faces: [-0.89, -0.45, 0.35]}
 )";
 }  // namespace
 
+TEST_CASE("a part of the job is nothing to resume", "[scenario]") {
+  const JobFolder folder;
+  const ProgramResult run = folder.run_job("out", {"--resume", "--only", "calibrate"});
+  CHECK(run.exit_code == 2);
+  CHECK_THAT(run.err, Contains("--resume") && Contains("--only"));
+}
+
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
   JobFolder folder;
   folder.options.signal_at = "sweep view 3";

@@ -80,6 +80,7 @@ TEST_CASE("the robot's program as a file", "[scenario]") {
   CHECK_THAT(script, Contains("socket_open(\"192.168.1.10\", 50001, \"firstlook\")") && !Contains("%"));
   CHECK(folder.run({"ur-script", "--host", "192.168.1.10", "-o", "-"}).out == script);
   CHECK(folder.run({"ur-script"}).exit_code == 2);
+  CHECK(folder.run({"ur-script", "--host", "cart\") popup(\"", "-o", "-"}).exit_code == 2);
 }
 
 }  // namespace firstlook
