@@ -74,7 +74,7 @@ int run_ur_sim(const UrSimCommand& command) {
   catch_stop_signals();
   const Status served =
       sim::ur::serve_on_tcp(robot, {command.host, command.port_offset, !command.cell.empty(), command.play_after_s});
-  if (served) return kDone;
+  if (served) return kExitDone;
   std::fprintf(
       stderr,
       "firstlook: E%d %s\n      Give --host an address of this computer; a port that is taken: end the program "
@@ -98,7 +98,7 @@ int run_ur_script(const UrScriptCommand& command) {
   } else if (const Status written = write_file_atomically(command.out, script); !written) {
     return fail(written.error());
   }
-  return kDone;
+  return kExitDone;
 }
 
 /// Data that nobody received must not look like success: a full disk shows itself only here.
@@ -123,7 +123,7 @@ struct Dispatch {
   int operator()(const ReplayCommand& c) const { return run_replay_command(c.journal); }
   int operator()(const StatesCommand&) const {
     std::fputs(state_diagram().c_str(), stdout);
-    return kDone;
+    return kExitDone;
   }
   int operator()(const ExplainCommand& c) const { return run_explain_command(c.code); }
   int operator()(const ConfigCommandOptions& c) const { return run_config_command(c); }
@@ -134,13 +134,13 @@ struct Dispatch {
 int run(const Command& command) {
   try {
     const int code = std::visit(Dispatch{}, command);
-    return flush_stdout() ? code : kData;
+    return flush_stdout() ? code : kExitData;
   } catch (const std::system_error& refused) {
     std::fprintf(stderr, "firstlook: E%d cannot write: %s\n", static_cast<int>(Fault::kDiskWrite), refused.what());
-    return kData;
+    return kExitData;
   } catch (const std::exception& unexpected) {
     std::fprintf(stderr, "firstlook: E%d internal fault: %s\n", static_cast<int>(Fault::kInternal), unexpected.what());
-    return kInternal;
+    return kExitInternal;
   }
 }
 

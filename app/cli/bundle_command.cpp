@@ -6,18 +6,12 @@
 #include <filesystem>
 
 #include "app/bundle/support_bundle.hpp"
+#include "app/cli/exit_codes.hpp"
 
 namespace firstlook {
 namespace {
 
-constexpr int kExitDone = 0;
-constexpr int kExitData = 3;
 constexpr std::size_t kShownMax = 20;
-
-int refuse(const Error& error) {
-  fmt::print(stderr, "firstlook: {}\n", describe(error));
-  return kExitData;
-}
 
 }  // namespace
 
@@ -31,7 +25,7 @@ int run_bundle_command(const BundleCommandOptions& options) {
   const std::string name = std::filesystem::weakly_canonical(options.folder, ignored).filename().string();
   bundle.out = options.out.empty() ? fmt::format("{}.tar.gz", name.empty() ? "run" : name) : options.out;
   const Result<BundleSummary> packed = write_support_bundle(bundle);
-  if (!packed) return refuse(packed.error());
+  if (!packed) return fail(packed.error());
   fmt::print(stderr, "packed    {} files, {:.1f} MB\n", packed->packed.size(),
              static_cast<double>(packed->bytes) * 1e-6);
   for (std::size_t i = 0; i < packed->left_out.size() && i < kShownMax; ++i) {

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "app/campaign/campaign.hpp"
+#include "app/cli/exit_codes.hpp"
 #include "app/cli/small_commands.hpp"
 #include "app/config/load_config.hpp"
 #include "platform/journal/journal.hpp"
@@ -16,7 +17,6 @@
 namespace firstlook {
 namespace {
 
-constexpr int kExitDone = 0, kExitUsage = 2, kExitData = 3, kExitStopped = 6, kExitInternal = 70;
 constexpr int kJobsMax = 1024;
 constexpr double kCellLimitMax_s = 1e6;
 constexpr std::int64_t kSeedMax = std::int64_t{1} << 53;  // as config_keys.cpp

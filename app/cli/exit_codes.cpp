@@ -9,28 +9,28 @@ namespace firstlook {
 int exit_code_of(const Error& error) {
   switch (error.fault) {
     case Fault::kUsage:
-      return kUsage;
+      return kExitUsage;
     case Fault::kDeviceMissing:
-      return kDevice;
+      return kExitDevice;
     case Fault::kInternal:
-      return kInternal;
+      return kExitInternal;
     default:
-      return kData;
+      return kExitData;
   }
 }
 
 int exit_code_of(const Ending& ending) {
   switch (ending.outcome) {
     case Outcome::kDone:
-      return kDone;
+      return kExitDone;
     case Outcome::kCalibrationRejected:
-      return kRejected;
+      return kExitRejected;
     case Outcome::kSafelyStopped:
-      return kStopped;
+      return kExitStopped;
     case Outcome::kFaulted:
-      return ending.fault == Fault::kDeviceMissing ? kDevice : kInternal;
+      return ending.fault == Fault::kDeviceMissing ? kExitDevice : kExitInternal;
   }
-  return kInternal;
+  return kExitInternal;
 }
 
 int fail(const Error& error) {

@@ -6,7 +6,15 @@
 
 namespace firstlook {
 
-enum ExitCode : int { kDone = 0, kUsage = 2, kData = 3, kDevice = 4, kRejected = 5, kStopped = 6, kInternal = 70 };
+enum ExitCode : int {
+  kExitDone = 0,
+  kExitUsage = 2,
+  kExitData = 3,
+  kExitDevice = 4,
+  kExitRejected = 5,
+  kExitStopped = 6,
+  kExitInternal = 70
+};
 
 [[nodiscard]] int exit_code_of(const Error& error);
 [[nodiscard]] int exit_code_of(const Ending& ending);

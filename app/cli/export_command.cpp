@@ -10,6 +10,7 @@
 
 #include "algorithms/mapping/moveit_scene.hpp"
 #include "algorithms/mapping/octomap_message.hpp"
+#include "app/cli/exit_codes.hpp"
 #include "app/dataset/dataset_mapping.hpp"
 #include "app/dataset/hand_eye_file.hpp"
 #include "app/dataset/map_file.hpp"
@@ -21,7 +22,6 @@
 namespace firstlook {
 namespace {
 
-constexpr int kExitDone = 0, kExitUsage = 2, kExitData = 3;
 constexpr std::size_t kTextMax = 1 << 20;
 constexpr std::string_view kMapFrame = "base";  // of a run's map: the controller's, not ROS's base_link
 

@@ -11,6 +11,7 @@
 
 #include "algorithms/mapping/map_change.hpp"
 #include "algorithms/mapping/objects.hpp"
+#include "app/cli/exit_codes.hpp"
 #include "app/dataset/dataset_mapping.hpp"
 #include "app/dataset/map_file.hpp"
 #include "app/report/color_picture.hpp"
@@ -25,7 +26,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kExitDone = 0, kExitUsage = 2, kExitData = 3;
 constexpr double kResolutionMin_m = 0.002, kResolutionMax_m = 1.0;
 constexpr double kRangeLimit_m = 50;
 constexpr double kPlaceMax_m = 1e6;

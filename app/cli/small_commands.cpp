@@ -3,14 +3,11 @@
 #include <charconv>
 #include <cstdio>
 
+#include "app/cli/exit_codes.hpp"
 #include "platform/core/fault_table.hpp"
 
 namespace firstlook {
 namespace {
-
-constexpr int kExitDone = 0;
-constexpr int kExitUsage = 2;
-constexpr int kExitConfiguration = 3;
 
 std::string_view severity_text(Severity severity) {
   switch (severity) {
@@ -56,7 +53,7 @@ int run_config_command(const ConfigCommandOptions& options) {
   const Result<LoadedConfig> loaded = load_config(options.sources);
   if (!loaded) {
     fmt::print(stderr, "{}\n", describe(loaded.error()));
-    return kExitConfiguration;
+    return kExitData;
   }
   fmt::print("{}", print_config(loaded->config));
   return kExitDone;

@@ -48,6 +48,7 @@ ServiceStatus::ServiceStatus(std::string_view works_on)
 
 void ServiceStatus::state(std::string_view name, bool ready) {
   take(name, state_);
+  take("", text_);  // of the state before
   if (ready && !told_ready_) told_ready_ = manager_.send("READY=1");
   publish();
 }

@@ -69,7 +69,7 @@ int run_check(const CheckCommand& command) {
                           : fmt::format("what is not configured is of the simulated cell {}", config.cell));
   CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};
   std::fputs((command.json ? check_json(result) : check_text(result)).c_str(), stdout);
-  return result.all_ready() ? kDone : kDevice;
+  return result.all_ready() ? kExitDone : kExitDevice;
 }
 
 }  // namespace firstlook
