@@ -1,5 +1,5 @@
-/// The first look around after calibration: the base turns in steps, then the wrist tilts (the thesis found that random
-/// views alone start badly from inside the safe zone).
+/// The first look around after calibration: the base turns in steps, then the wrist tilts (the thesis found that its
+/// random views start badly from inside the safe zone). Whoever has better views than those stops it early.
 #pragma once
 
 #include "algorithms/motion/planner.hpp"

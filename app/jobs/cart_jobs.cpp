@@ -128,9 +128,8 @@ Duration virtual_duration(JobKind kind) {
     case JobKind::kColorLook:
       return milliseconds(80);
     case JobKind::kNextSweepView:
-      return milliseconds(100);
     case JobKind::kNextView:
-      return milliseconds(500);
+      return milliseconds(200);
     case JobKind::kSummarize:
       return milliseconds(500);
   }

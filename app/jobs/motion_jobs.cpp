@@ -105,10 +105,21 @@ NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
   if (!step) {
     result.blocked = step.error().fault == Fault::kStartBlocked;
     result.fault = step.error().fault;
-  } else if (!step->done) {
+  } else if (!step->done && !exploring_is_faster(view_context, *step, pace, here)) {
     take_choice(result, step->path, step->gain.unknown, pace);
   }
   return result;
+}
+
+/// Whether the best view that exploration finds from here tells more a second than a step of the sweep. The thesis's
+/// sweep goes on to its end: its views are few and start badly without.
+bool Workbench::exploring_is_faster(const ViewContext& view_context, const SweepStep& step, const Pace& pace,
+                                    const FromHere& here) {
+  if (config_.explore.views == "thesis2014") return false;
+  const Result<ViewChoice> best = choose_view(view_context, pace, here);
+  const ViewTiming timing = view_timing(pace);
+  const double step_s = step.path.duration_s + timing.settle_s + timing.look_s;
+  return best && best->outcome == ViewChoice::Outcome::kChosen && best->utility_per_s > step.gain.weight() / step_s;
 }
 
 NextViewResult Workbench::next_sweep_view(const FromHere& here) {
@@ -122,6 +133,10 @@ NextViewResult Workbench::next_sweep_view(const FromHere& here) {
   sweeping_ = result.found || result.blocked;
   if (!sweeping_) std::copy(map_.log_odds().begin(), map_.log_odds().end(), swept_log_odds_.begin());
   return result;
+}
+
+ViewTiming Workbench::view_timing(const Pace& pace) const {
+  return {.limits = pace.limits, .settle_s = config_.calibration.settle_time_s};
 }
 
 Result<ViewChoice> Workbench::choose_view(const ViewContext& view_context, const Pace& pace, const FromHere& here) {
@@ -138,9 +153,8 @@ Result<ViewChoice> Workbench::choose_view(const ViewContext& view_context, const
   options.step = here.step;
   options.gain_min = static_cast<std::uint32_t>(config_.explore.cluster_voxels_min);
   options.certificate_samples = config_.explore.certificate_samples;
-  options.timing.limits = pace.limits;
+  options.timing = view_timing(pace);
   options.trail = trail_;
-  options.timing.settle_s = config_.calibration.settle_time_s;
   return chooser_.choose(view_context, here.at_rad, options, [this](int n, IndexedBody body) {
     workers_.parallel_for(n, [&body](int index, int worker) { body(index, worker); });
   });

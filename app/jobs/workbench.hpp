@@ -193,6 +193,9 @@ class Workbench {
   [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
   [[nodiscard]] ViewContext context(const Clearance& clearance) const;
   [[nodiscard]] NextViewResult sweep_at(const Pace& pace, const FromHere& here);
+  [[nodiscard]] bool exploring_is_faster(const ViewContext& view_context, const SweepStep& step, const Pace& pace,
+                                         const FromHere& here);
+  [[nodiscard]] ViewTiming view_timing(const Pace& pace) const;
   [[nodiscard]] Result<ViewChoice> choose_view(const ViewContext& view_context, const Pace& pace, const FromHere& here);
   [[nodiscard]] NextViewResult explore_at(const Pace& pace, const FromHere& here);
 

@@ -47,9 +47,9 @@ double phase_start_s(const Json& result, const std::string& name) {
   return -1;
 }
 
-/// When the sweep of this job begins: where a run of the calibration alone leaves off. The sweep takes longer than the
+/// When mapping begins in this job: where a run of the calibration alone leaves off. Mapping takes longer than the
 /// 20 s at most that the tests add to it.
-double sweep_start_s() {
+double mapping_start_s() {
   static const double start_s = [] {
     const JobFolder folder;
     REQUIRE(folder.run_job("run", {"--only", "calibrate"}).exit_code == 0);
@@ -57,8 +57,8 @@ double sweep_start_s() {
   }();
   return start_s;
 }
-std::string in_sweep(const std::string& fault, double after_s) {
-  return fault + "=" + std::to_string(sweep_start_s() + after_s);
+std::string in_mapping(const std::string& fault, double after_s) {
+  return fault + "=" + std::to_string(mapping_start_s() + after_s);
 }
 
 /// The job stops once, at a time within 0.2 s after the fault, for its reason.
@@ -86,11 +86,11 @@ TEST_CASE("a lost link is one, whether the arm moves, waits or has not begun", "
 }
 
 TEST_CASE("a stop or a silent depth camera while mapping", "[scenario]") {
-  check_stop(run_with(in_sweep("link.lost_at", 15), stopped("E5002")), sweep_start_s() + 15);
-  check_stop(run_with(in_sweep("arm.emergency_stop_at", 17), stopped("E5004")), sweep_start_s() + 17);
-  const Json stalled = run_with(in_sweep("depth.stall_at", 16), stopped("E5003"));
+  check_stop(run_with(in_mapping("link.lost_at", 15), stopped("E5002")), mapping_start_s() + 15);
+  check_stop(run_with(in_mapping("arm.emergency_stop_at", 17), stopped("E5004")), mapping_start_s() + 17);
+  const Json stalled = run_with(in_mapping("depth.stall_at", 16), stopped("E5003"));
   CHECK(stalled["safety"]["stops"].size() == 1);
-  CHECK(stalled["safety"]["stops"][0]["time_s"].get<double>() < sweep_start_s() + 20);
+  CHECK(stalled["safety"]["stops"][0]["time_s"].get<double>() < mapping_start_s() + 20);
 }
 
 TEST_CASE("a pause is waited for, but not for ever", "[scenario]") {
@@ -101,8 +101,8 @@ TEST_CASE("a pause is waited for, but not for ever", "[scenario]") {
 }
 
 TEST_CASE("after a long pause the surroundings are looked at again", "[scenario]") {
-  const Json result = run_with(in_sweep("operator.pause_at", 20) + ":70", kDone);
-  CHECK(phase_start_s(result, "Paused") == Approx(sweep_start_s() + 20).margin(0.1));
+  const Json result = run_with(in_mapping("operator.pause_at", 20) + ":70", kDone);
+  CHECK(phase_start_s(result, "Paused") == Approx(mapping_start_s() + 20).margin(0.1));
 }
 
 TEST_CASE("nobody presses Play: the job does not wait for ever", "[scenario]") {
@@ -136,10 +136,10 @@ TEST_CASE("an arm that starts outside of its safe zone does not move, and is tol
 }
 
 TEST_CASE("a board that moves rejects the calibration, or the map", "[scenario]") {
-  const Json early = run_with("board.move_at=" + std::to_string(0.5 * sweep_start_s()), rejected("E2007"));
+  const Json early = run_with("board.move_at=" + std::to_string(0.5 * mapping_start_s()), rejected("E2007"));
   CHECK(early["hand_eye"]["verdict"] == "rejected");
   CHECK(early["mapping"].is_null());
-  run_with(in_sweep("board.move_at", 10), stopped("E2008"));
+  run_with(in_mapping("board.move_at", 10), stopped("E2008"));
 }
 
 TEST_CASE("a camera that states wrong intrinsics is found out, or has them estimated", "[scenario]") {
@@ -204,15 +204,15 @@ TEST_CASE("cameras that were never there, or stop, or hang, or have a wrong cloc
 }
 
 TEST_CASE("a depth camera that repeats its picture is found out before it can mislead", "[scenario]") {
-  const Json frozen = run_with(in_sweep("depth.freeze_at", 17), stopped("E5011"));
-  CHECK(frozen["safety"]["stops"][0]["time_s"].get<double>() < sweep_start_s() + 22);
+  const Json frozen = run_with(in_mapping("depth.freeze_at", 17), stopped("E5011"));
+  CHECK(frozen["safety"]["stops"][0]["time_s"].get<double>() < mapping_start_s() + 22);
   CHECK(frozen["truth"]["false_free_voxels"] == 0);
 }
 
 TEST_CASE("lost frames cost time, not the job", "[scenario]") { run_with("depth.drop=0.3,color.drop=0.3", kDone); }
 
 TEST_CASE("an obstacle that appears in reach is seen and kept clear of", "[scenario]") {
-  const Json result = run_with(in_sweep("obstacle.appear_at", 20), kDone);
+  const Json result = run_with(in_mapping("obstacle.appear_at", 20), kDone);
   CHECK(result["mapping"]["voxels"]["occupied"].get<int>() > 0);
 }
 

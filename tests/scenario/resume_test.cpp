@@ -26,7 +26,7 @@ TEST_CASE("a part of the job is nothing to resume", "[scenario]") {
 
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
   JobFolder folder;
-  folder.options.signal_at = "sweep view 3";
+  folder.options.signal_at = "view 5: ";
   folder.options.signal = SIGKILL;
   const ProgramResult killed = folder.run_job("runs/first");
   REQUIRE(killed.exit_code == 128 + SIGKILL);
