@@ -26,7 +26,8 @@ std::optional<CornerTerm> corner_term(const CameraIntrinsics& camera, const View
 void ViewNormal::add(const CornerTerm& term, const Eigen::Vector2d& residual, double weight) {
   Eigen::Matrix<double, 2, 12> j;
   j << term.d_hand_eye, term.d_board;
-  global.noalias() += weight * j.transpose() * j;
+  // Lazy: two rows are no work for Eigen's blocked kernels, which take this size otherwise.
+  global += weight * j.transpose().lazyProduct(j);
   global_arm.noalias() += weight * j.transpose() * term.d_arm;
   arm.noalias() += weight * term.d_arm.transpose() * term.d_arm;
   global_right.noalias() += weight * j.transpose() * residual;

@@ -161,21 +161,28 @@ double DistanceField::distance_m(const Eigen::Vector3d& point_m) const {
   }
   const bool inside = v[0] >= 0 && v[1] >= 0 && v[2] >= 0 && v[0] + 1 < geometry_.size.x() &&
                       v[1] + 1 < geometry_.size.y() && v[2] + 1 < geometry_.size.z();
-  const std::size_t first = inside ? geometry_.index({v[0], v[1], v[2]}) : 0;
-  const std::size_t row = to_size(geometry_.size.x()), layer = row * to_size(geometry_.size.y());
   double squared = 0;
-  for (int dz = 0; dz < 2; ++dz) {
-    const double wz = dz != 0 ? f[2] : 1 - f[2];
-    for (int dy = 0; dy < 2; ++dy) {
-      const double wy = wz * (dy != 0 ? f[1] : 1 - f[1]);
-      for (int dx = 0; dx < 2; ++dx) {
-        const int x = v[0] + dx, y = v[1] + dy, z = v[2] + dz;
-        if (!inside && !geometry_.contains({x, y, z})) continue;  // outside the grid nothing is free
-        const std::size_t at =
-            inside ? first + to_size(dz) * layer + to_size(dy) * row + to_size(dx) : geometry_.index({x, y, z});
-        const auto d = static_cast<double>(values_[at]);
-        squared += wy * (dx != 0 ? f[0] : 1 - f[0]) * d * d;
+  if (inside) {
+    const std::size_t row = to_size(geometry_.size.x()), layer = row * to_size(geometry_.size.y());
+    const float* const first = values_.data() + geometry_.index({v[0], v[1], v[2]});
+    for (int dz = 0; dz < 2; ++dz) {
+      const double wz = dz != 0 ? f[2] : 1 - f[2];
+      for (int dy = 0; dy < 2; ++dy) {
+        const double wy = wz * (dy != 0 ? f[1] : 1 - f[1]);
+        const float* const pair = first + to_size(dz) * layer + to_size(dy) * row;
+        const double d0 = pair[0], d1 = pair[1];
+        squared += wy * (1 - f[0]) * d0 * d0;
+        squared += wy * f[0] * d1 * d1;
       }
+    }
+  } else {
+    for (int corner = 0; corner < 8; ++corner) {
+      const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
+      const Eigen::Vector3i at(v[0] + dx, v[1] + dy, v[2] + dz);
+      if (!geometry_.contains(at)) continue;  // outside the grid nothing is free
+      const double wy = (dz != 0 ? f[2] : 1 - f[2]) * (dy != 0 ? f[1] : 1 - f[1]);
+      const auto d = static_cast<double>(values_[geometry_.index(at)]);
+      squared += wy * (dx != 0 ? f[0] : 1 - f[0]) * d * d;
     }
   }
   squared -= spread * geometry_.resolution_m * geometry_.resolution_m;

@@ -85,8 +85,10 @@ Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, VoxelColor c
           flat ? std::numeric_limits<double>::infinity() : ((d > 0 ? v[axis] + 1 : v[axis]) - origin[axis]) / d;
       delta[axis] = flat ? std::numeric_limits<double>::infinity() : 1 / std::abs(d);
     }
-    while (g.contains(v)) {
-      const std::size_t index = g.index(v);
+    const std::ptrdiff_t strides[3] = {1, g.size.x(), std::ptrdiff_t{g.size.x()} * g.size.y()};
+    auto at = static_cast<std::ptrdiff_t>(g.index(v));
+    for (bool inside = true; inside;) {
+      const auto index = static_cast<std::size_t>(at);
       const VoxelClass voxel_class = map.voxel_class(index);
       const auto base = voxel_class == VoxelClass::kOccupied ? color_of(index) : std::nullopt;
       if (base) {
@@ -95,9 +97,12 @@ Color look(const VoxelMap& map, std::span<const std::uint8_t> zone, VoxelColor c
         return color;
       }
       if (voxel_class == VoxelClass::kUnknown && !zone.empty() && zone[index] != 0) over(kVeil, kVeilOpacity);
-      next.minCoeff(&face);
-      v[face] += direction[face] > 0 ? 1 : -1;
+      face = next[0] <= next[1] && next[0] <= next[2] ? 0 : next[1] <= next[2] ? 1 : 2;
+      const int step = direction[face] > 0 ? 1 : -1;
+      v[face] += step;
+      at += step * strides[face];
       next[face] += delta[face];
+      inside = v[face] >= 0 && v[face] < g.size[face];
     }
   }
   over(ground(g, point_m, direction, m_per_px), 1);

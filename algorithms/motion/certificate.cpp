@@ -1,5 +1,6 @@
 #include "algorithms/motion/certificate.hpp"
 
+#include <algorithm>
 #include <bitset>
 #include <limits>
 
@@ -9,6 +10,7 @@ namespace firstlook {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kFieldSag_m = 0.02;  // README: what the field's bound is low by between voxel centres
 
 /// When to stop refining a margin.
 struct Wanted {
@@ -20,7 +22,8 @@ struct Wanted {
 /// short. Along a segment the depth in the (convex) zone is smallest at an end; distances to voxels, those of the field
 /// and those that the zone lost, are read in the middle and can fall by half the length towards the ends. A bound of a
 /// whole piece holds for its halves too (`inherited`), so that whether the result is enough does not depend on what is
-/// asked for.
+/// asked for. What is blocked mostly is so by far: a point that falls short by more than the field's bound can be low
+/// (kFieldSag_m) ends the search.
 double axis_margin(const FreeSpace& space, const Clearance& need, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                    double length_m, const Wanted& wanted, double inherited) {
   const Eigen::Vector3d middle = (a + b) / 2;
@@ -28,8 +31,13 @@ double axis_margin(const FreeSpace& space, const Clearance& need, const Eigen::V
   double bound = inherited;
   if (in_zone > bound) bound = std::max(bound, std::min(in_zone, space.revoked_margin_m(middle, need) - length_m / 2));
   if (bound >= wanted.enough || (space.field == nullptr && space.revoked == nullptr)) return bound;
-  bound = std::max(bound, space.field_margin_m(middle, need) - length_m / 2);
+  const double in_field = space.field_margin_m(middle, need);
+  bound = std::max(bound, in_field - length_m / 2);
   if (bound >= wanted.enough || length_m <= kAxisSpacing_m) return bound;
+  if (in_field < wanted.stop - kFieldSag_m) {
+    const double here = std::max(in_field, space.zone_margin_m(middle, need));
+    if (here < wanted.stop - kFieldSag_m) return here;
+  }
   const double first = axis_margin(space, need, a, middle, length_m / 2, wanted, bound);
   if (first < wanted.stop) return first;
   return std::min(first, axis_margin(space, need, middle, b, length_m / 2, wanted, bound));
@@ -58,10 +66,28 @@ double capsule_margin(const FreeSpace& space, const Clearance& need, const Capsu
   return margin;
 }
 
+Capsule place(const Capsule& capsule, const LinkFrames& frames) {
+  const Pose& base_T_link = frames.base_T_link[static_cast<std::size_t>(capsule.link)];
+  return {base_T_link * capsule.a, base_T_link * capsule.b, capsule.radius_m, capsule.link};
+}
+
 double pair_margin(const Capsules& placed, const SelfPair& pair) {
   const Capsule& n = placed[static_cast<std::size_t>(pair.near)];
   const Capsule& f = placed[static_cast<std::size_t>(pair.far)];
   return segment_distance_m(n.a, n.b, f.a, f.b) - pair.axes_apart_m;
+}
+
+/// The same as self_margin_m >= margin_m. Most pairs are so far apart that the balls around their capsules tell.
+bool pairs_keep(const Capsules& placed, const SelfPairs& pairs, double margin_m) {
+  constexpr double kRounding_m = 1e-9;
+  FixedVector<double, kCapsulesMax> half_m;
+  for (const Capsule& c : placed) half_m.push_back((c.b - c.a).norm() / 2);
+  return std::all_of(pairs.begin(), pairs.end(), [&](const SelfPair& pair) {
+    const auto near = static_cast<std::size_t>(pair.near), far = static_cast<std::size_t>(pair.far);
+    const double apart_m = pair.axes_apart_m + margin_m + half_m[near] + half_m[far] + kRounding_m;
+    const Eigen::Vector3d twice = placed[near].a + placed[near].b - placed[far].a - placed[far].b;
+    return (apart_m >= 0 && twice.squaredNorm() >= 4 * apart_m * apart_m) || pair_margin(placed, pair) >= margin_m;
+  });
 }
 
 /// Whether every joint is at least `margin_rad` inside its limits.
@@ -151,10 +177,9 @@ class Proof {
     ++result_.evaluations;
     const LinkFrames frames = forward(arm_, from_ + dq_ * at.middle);
     const LinkTwists twists = link_twists(frames, dq_);
-    const Capsules placed = place(body_.capsules, frames);
-    for (std::size_t i = 0; i < placed.size(); ++i) {
+    for (std::size_t i = 0; i < body_.capsules.size(); ++i) {
       if (!at.capsules.test(i)) continue;
-      const Capsule& c = placed[i];
+      const Capsule c = place(body_.capsules[i], frames);
       const double speed =
           std::sqrt(std::max(twists.velocity(c.link, c.a).squaredNorm(), twists.velocity(c.link, c.b).squaredNorm()));
       const double moves = travel(speed, i, at.half);
@@ -165,6 +190,8 @@ class Proof {
       at.capsules.reset(i);
       result_.margin_m = std::min(result_.margin_m, margin - moves);
     }
+    if (at.pairs.none()) return true;
+    const Capsules placed = place(body_.capsules, frames);
     for (std::size_t i = 0; i < body_.self_pairs.size(); ++i) {
       if (!at.pairs.test(i)) continue;
       const SelfPair& pair = body_.self_pairs[i];
@@ -223,12 +250,13 @@ double configuration_margin(const ArmModel& arm, const Body& body, const FreeSpa
 bool configuration_is_free(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
                            const JointVector& q_rad, double margin_m) {
   if (!within_limits(arm, q_rad, kLimitMargin_rad)) return false;
-  const Capsules placed = place(body.capsules, forward(arm, q_rad));
-  for (std::size_t i = placed.size(); i-- > 0;) {  // the outermost capsules fail most often
-    if (body.exempt[i] == 0 && !(capsule_margin(space, clearance, placed[i], {margin_m, margin_m}) >= margin_m))
-      return false;
+  const LinkFrames frames = forward(arm, q_rad);
+  for (std::size_t i = body.capsules.size(); i-- > 0;) {  // the outermost capsules fail most often
+    if (body.exempt[i] != 0) continue;
+    const Capsule placed = place(body.capsules[i], frames);
+    if (!(capsule_margin(space, clearance, placed, {margin_m, margin_m}) >= margin_m)) return false;
   }
-  return self_margin_m(placed, body.self_pairs) >= margin_m;
+  return pairs_keep(place(body.capsules, frames), body.self_pairs, margin_m);
 }
 
 Certificate certify(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,

@@ -12,12 +12,17 @@ namespace {
 
 constexpr std::uint64_t kRandomStream = 4001;
 
-/// "capsule 8 (link 6), -0.0120 m at 0.50 of the segment" for the detail of an error.
-std::unexpected<Error> blocked(Fault fault, std::string_view what, const Body& body, const Certificate& c) {
+/// "start: what is carried by link 6 meets the arm itself, 12.0 mm short of what must remain" for the detail of an
+/// error.
+std::unexpected<Error> blocked(Fault fault, std::string_view what, const ArmModel& arm, const Body& body,
+                               const Certificate& c) {
   if (c.capsule < 0) return failure(fault, "{} is outside the joint limits", what);
-  return failure(fault, "{}: capsule {} of link {} {} (margin {:.4f} m)", what, c.capsule,
-                 body.capsules[static_cast<std::size_t>(c.capsule)].link,
-                 c.self_collision ? "meets the arm itself" : "leaves known free space", c.margin_m);
+  const int link = body.capsules[static_cast<std::size_t>(c.capsule)].link;
+  const bool carried = static_cast<std::size_t>(c.capsule) >= arm.body.size();  // the arm's own come first
+  return failure(fault, "{}: {} {} {}, {:.1f} mm short of what must remain", what,
+                 carried ? "what is carried by link" : "link", link,
+                 c.self_collision ? "meets the arm itself" : "leaves known free space",
+                 1e3 * std::max(0.0, kMarginMin_m - c.margin_m));
 }
 
 }  // namespace
@@ -60,7 +65,7 @@ Status Planner::begin(const ArmModel& arm, const Body& body, const FreeSpace& sp
   from_start_.push_back({.q = start});
   trail_nodes_ = 1;
   const Certificate standing = check(start, start);
-  if (!standing.certified()) return blocked(Fault::kStartBlocked, "start", body, standing);
+  if (!standing.certified()) return blocked(Fault::kStartBlocked, "start", arm, body, standing);
   follow_trail();
   return {};
 }
@@ -83,8 +88,9 @@ Result<Path> Planner::plan_to(const JointVector& goal) {
   ENSURE(4133, arm_ != nullptr);
   const Certificate straight = check(start_, goal);
   if (straight.verdict == CertificateVerdict::kStartBlocked)
-    return blocked(Fault::kStartBlocked, "start", *body_, straight);
-  if (straight.verdict == CertificateVerdict::kEndBlocked) return blocked(Fault::kNoPath, "goal", *body_, straight);
+    return blocked(Fault::kStartBlocked, "start", *arm_, *body_, straight);
+  if (straight.verdict == CertificateVerdict::kEndBlocked)
+    return blocked(Fault::kNoPath, "goal", *arm_, *body_, straight);
   if (straight.certified()) {
     chain_.assign({start_, goal});
     return finish();
@@ -230,7 +236,7 @@ Result<Path> Planner::finish() const {
   path.waypoints.push_back(chain_[0]);
   for (std::size_t i = 1; i < chain_.size(); ++i) {
     const Certificate proof = check(chain_[i - 1], chain_[i]);
-    if (!proof.certified()) return blocked(Fault::kNoPath, "segment", *body_, proof);
+    if (!proof.certified()) return blocked(Fault::kNoPath, "segment", *arm_, *body_, proof);
     const SegmentTiming timing = time_segment(*arm_, body_->capsules, chain_[i - 1], chain_[i], options_.limits);
     path.waypoints.push_back(chain_[i]);
     path.margin_m = std::min(path.margin_m, proof.margin_m);

@@ -46,6 +46,16 @@ bool may_block(const Capsule& capsule, const Eigen::Vector3d& eye, const Eigen::
   return angle - std::asin(radius_m / distance_m) <= half_cone_rad;
 }
 
+/// Whether a capsule's bounding sphere (a little more) comes near the line of a ray: cheaper than to ask for the
+/// segment.
+bool may_block(const Capsule& capsule, const Eigen::Vector3d& eye, const Eigen::Vector3d& to) {
+  constexpr double kRounding_m = 1e-6;
+  const double reach_m = (capsule.b - capsule.a).norm() / 2 + capsule.radius_m + kRounding_m;
+  const Eigen::Vector3d ray = to - eye;
+  const Eigen::Vector3d to_center = (capsule.a + capsule.b) / 2 - eye;
+  return to_center.cross(ray).squaredNorm() <= reach_m * reach_m * ray.squaredNorm();
+}
+
 }  // namespace
 
 GainWorker::GainWorker(const GridGeometry& geometry, std::size_t rays_max) : scratch(geometry) {
@@ -155,7 +165,7 @@ const GainRays& GainModel::free_rays(const ViewContext& context, const LinkFrame
   for (const Eigen::Vector3d& end : rays_.ends_m) {
     const Eigen::Vector3d to = base_T_depth * end;
     const bool blocked = std::any_of(blocking.begin(), blocking.end(), [&](const Capsule& c) {
-      return segment_distance_m(eye, to, c.a, c.b) <= c.radius_m;
+      return may_block(c, eye, to) && segment_distance_m(eye, to, c.a, c.b) <= c.radius_m;
     });
     if (!blocked) worker.rays.ends_m.push_back(end);
   }
@@ -174,7 +184,8 @@ ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, 
   };
   ViewGain gain = count_along(rays);
   if (far_.knows_openings() && gain.unknown + gain.again > 0) {
-    const ViewGain sure = count_along(returning_rays(base_T_depth, rays, worker));
+    const GainRays& returning = returning_rays(base_T_depth, rays, worker);
+    const ViewGain sure = returning.ends_m.size() == rays.ends_m.size() ? gain : count_along(returning);
     gain.doubtful = gain.unknown - std::min(gain.unknown, sure.unknown);
     gain.doubtful_again = gain.again - std::min(gain.again, sure.again);
   }

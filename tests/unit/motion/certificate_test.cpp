@@ -94,6 +94,31 @@ TEST_CASE("dense sampling confirms every certificate, and what has room is certi
   CHECK(roomy > 10);
 }
 
+TEST_CASE("the quick verdict about a configuration is that of its margin") {
+  const ArmModel arm = *find_arm_model("ur5");
+  Pose mount = Pose::Identity();
+  mount.translation() = Eigen::Vector3d(0, -0.07, 0.05);
+  const Body bodies[] = {body_with_envelope(arm), body_with_camera(arm, Transform<Flange, Camera>(mount))};
+  Random random(8);
+  int free = 0, near = 0;
+  for (std::uint64_t seed = 21; seed <= 32; ++seed) {
+    RandomCell cell(seed, 8);
+    const Case c{"", seed % 2 == 0, seed % 3 == 0, seed % 4 < 2 ? 0 : 25};
+    const RandomCell left = take_from_zone(cell, seed, c.taken);
+    const FreeSpace space = space_of(cell, c, c.taken > 0 ? &left : nullptr);
+    for (int i = 0; i < 10000; ++i) {
+      const Body& body = bodies[i % 2];
+      const JointVector q = random_joints(random, 3.1);
+      const double margin = configuration_margin(arm, body, space, kNeed, q);
+      REQUIRE(configuration_is_free(arm, body, space, kNeed, q, 0.005) == (margin >= 0.005));
+      free += margin >= 0.005 ? 1 : 0;
+      near += std::abs(margin - 0.005) < 0.02 ? 1 : 0;
+    }
+  }
+  CHECK(free > 10000);
+  CHECK(near > 5000);
+}
+
 TEST_CASE("the margin of a configuration is a tight lower bound") {
   const ArmModel arm = *find_arm_model("ur5");
   const Body body = bare_body(arm);

@@ -118,6 +118,20 @@ TEST_CASE("walled in: no path, and the reason") {
   const auto start_blocked = planner.plan(arm, body, zone_only, kNeed, outside, start, options);
   REQUIRE_FALSE(start_blocked);
   CHECK(start_blocked.error().fault == Fault::kStartBlocked);
+  CHECK(start_blocked.error().detail().find("start: link 3 leaves known free space, ") == 0);
+
+  const Body enveloped = body_with_envelope(arm, 0.45);
+  const auto carried_blocked = planner.plan(arm, enveloped, zone_only, kNeed, start, start, options);
+  REQUIRE_FALSE(carried_blocked);
+  CHECK(carried_blocked.error().detail().find("start: what is carried by link 6 leaves known free space, ") == 0);
+
+  JointVector folded = start;
+  folded[2] = 2.9;
+  FreeSpace everywhere;
+  everywhere.zone = {.radius_m = 9, .height_m = 18, .floor_m = -9};
+  const auto meets_itself = planner.plan(arm, enveloped, everywhere, kNeed, folded, start, options);
+  REQUIRE_FALSE(meets_itself);
+  CHECK(meets_itself.error().detail().find(" meets the arm itself, ") != std::string_view::npos);
 
   // Both ends free, a wall between them: four planes' worth of boxes cut the space in two at y = 0.
   FreeSpace halved;
