@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "app/dataset/calibration_dataset.hpp"
+#include "app/wiring/usb_check.hpp"
 #include "hal/can/can_panel.hpp"
 #include "hal/freenect/kinect.hpp"
 #include "hal/openni/openni_depth.hpp"
@@ -96,6 +97,7 @@ v4l2::V4l2CameraOptions camera_options(const Config::Camera& c, const CameraIntr
 Result<openni::OpenNiDepthOptions> depth_options(const Config::Depth& d) {
   openni::OpenNiDepthOptions options;
   if (d.device != "openni") options.sensor.uri = d.device;
+  if (!d.device.ends_with(".oni")) options.reset = usb_reset_of(usb::Part::kDepthSensor);
   if (d.info == "none") return options;
   const Result<CameraIntrinsics> read = read_camera_info(d.info);
   if (!read) return std::unexpected(read.error());
@@ -113,6 +115,7 @@ bool is_kinect(std::string_view device) { return device == kKinect || device.sta
 /// The Kinect behind one camera or both. Errors: those of a camera_info.yaml; a Kinect that is not there is none.
 Result<freenect::KinectOptions> kinect_options(const Config& config) {
   freenect::KinectOptions options;
+  options.reset = usb_reset_of(usb::Part::kKinectCamera);
   options.usb.depth = is_kinect(config.depth.device);
   options.usb.color = is_kinect(config.camera.device);
   for (const std::string& name : {config.depth.device, config.camera.device}) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
+#include <optional>
 
 #include "app/check/check_report.hpp"
 #include "app/check/device_check.hpp"
@@ -10,6 +12,7 @@
 #include "app/wiring/cell_grading.hpp"
 #include "app/wiring/network_arm.hpp"
 #include "app/wiring/real_devices.hpp"
+#include "app/wiring/usb_check.hpp"
 #include "hal/sim/simulated_cell.hpp"
 #include "platform/linux/terminal.hpp"
 
@@ -43,6 +46,8 @@ int run_check(const CheckCommand& command) {
   if (!checks) return fail(checks.error());
   if (config.robot.given()) robot = check_robot(config, narrator, *checks);
   const bool simulated = checks->empty();
+  std::optional<UsbCheck> usb;
+  if (config.camera.device != "none" || config.depth.device != "none") usb.emplace().add_to(*checks);
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), true, "", config.workers,
                                         configured_boards(config), config.depth.sensor});
   if (!cell) return fail(cell.error());
@@ -57,7 +62,7 @@ int run_check(const CheckCommand& command) {
   stand_in(kDepthRole, watch_stream(world.depth(), nullptr));
   stand_in(kPendantRole, watch_pendant(world.pendant(), nullptr));
   stand_in(kPanelRole, watch_panel(world.panel(), nullptr));
-  constexpr std::string_view kOrder[] = {kArmRole, kColorRole, kDepthRole, kPendantRole, kPanelRole};
+  constexpr std::string_view kOrder[] = {kArmRole, kColorRole, kDepthRole, kPendantRole, kPanelRole, kUsbRole};
   std::ranges::sort(*checks, {}, [&](const DeviceCheck& check) { return std::ranges::find(kOrder, check.role); });
   std::unique_ptr<Clock> clock;
   if (simulated) {
@@ -68,6 +73,7 @@ int run_check(const CheckCommand& command) {
   narrator.line(simulated ? fmt::format("no device is configured: those of the simulated cell {}", config.cell)
                           : fmt::format("what is not configured is of the simulated cell {}", config.cell));
   CheckResult result{watch_devices(*checks, *clock), check_warnings(config, simulated)};
+  if (usb) std::ranges::move(usb->warnings(), std::back_inserter(result.warnings));
   std::fputs((command.json ? check_json(result) : check_text(result)).c_str(), stdout);
   return result.all_ready() ? kExitDone : kExitDevice;
 }

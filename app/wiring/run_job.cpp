@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "app/cli/exit_codes.hpp"
+#include "app/machine/state_table.hpp"
 #include "app/report/checkpoint.hpp"
 #include "app/report/result_json.hpp"
 #include "app/report/run_files.hpp"
@@ -58,6 +61,14 @@ Result<Booted> boot(const Config& config, const CartOptions& options, const Cell
   auto made = Cart::make(config, options, facts, site.devices(), narrator);
   if (!made) return std::unexpected(made.error());
   return Booted{std::move(*made), heap.outstanding_bytes()};
+}
+
+/// Whether the job came further than to wait for its start.
+bool job_began(const RunRecord& record) {
+  constexpr StateId kBefore[] = {StateId::kBoot, StateId::kReady, StateId::kStopped, StateId::kFaulted};
+  return std::ranges::any_of(record.phases, [&](const PhaseRecord& phase) {
+    return std::ranges::none_of(kBefore, [&](StateId state) { return phase.name == state_row(state).name; });
+  });
 }
 
 /// All files of the run; behind them its checkpoint is of no use any more.
@@ -132,6 +143,12 @@ int run_job(const RunCommand& command) {
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";
   record.wall.folder = folder;
   narrate_result(record, narrator);
+  // A service is started again and again, also where a device is missing for days: only jobs leave folders behind.
+  if (command.resume && command.out.empty() && !job_began(record)) {
+    std::error_code left;
+    std::filesystem::remove_all(folder, left);
+    return ran ? exit_code_of(cart.ending()) : exit_code_of(ran.error());
+  }
   if (const Status written = write_run(command, config, folder, cart, record); !written) return fail(written.error());
   // Taken up and brought to its end; one that was stopped is offered again.
   if (resumed && record.outcome != Outcome::kSafelyStopped) remove_checkpoint(resumed->folder);

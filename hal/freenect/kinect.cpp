@@ -235,12 +235,28 @@ void Kinect::work() {
       }
     }
     changed_.notify_all();
+    const std::uint64_t depth_before = depth_.counters().frames, color_before = color_.counters().frames;
     if (trouble == KinectTrouble::kNone) stream(usb);
+    const bool frames_came = (!options_.usb.depth || depth_.counters().frames > depth_before) &&
+                             (!options_.usb.color || color_.counters().frames > color_before);
     usb.close();
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::nanoseconds(options_.reopen.ns), [&] { return stop_; });
-    if (stop_) return;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, std::chrono::nanoseconds(options_.reopen.ns), [&] { return stop_; });
+      if (stop_) return;
+    }
+    reset_if_silent(frames_came);
   }
+}
+
+void Kinect::reset_if_silent(bool frames_came) {
+  if (frames_came) options_.last_resort.frame_came();
+  if (!options_.reset || !options_.last_resort.due({system_.monotonic_ns()})) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    ++resets_;
+  }
+  options_.reset();
 }
 
 void Kinect::stream(KinectUsb& usb) {
@@ -301,6 +317,7 @@ hal::DeviceReport Kinect::report(const KinectStream& stream) const {
   count("opens", opens_);
   count("stalls", stalls_);
   count("disconnects", disconnects_);
+  count("resets", resets_);
   return report;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "hal/api/device_clock.hpp"
 #include "hal/api/device_report.hpp"
 #include "hal/api/frame_slots.hpp"
+#include "hal/api/last_resort.hpp"
 #include "hal/freenect/kinect_usb.hpp"
 #include "platform/linux/system_calls.hpp"
 #include "platform/linux/thread.hpp"
@@ -24,6 +26,8 @@ struct KinectOptions {
   Duration stall = milliseconds(1000);  ///< without a frame of one of its cameras for so long, it is opened again
   Duration reopen = milliseconds(1000);
   Duration boot_wait = milliseconds(5000);  ///< how long make() waits for the first opening to end, well or not
+  hal::LastResort last_resort{};
+  std::function<void()> reset{};  ///< of the device on its bus, when opening it again did not help; may block
 };
 
 /// Numbers the frames of one camera by its clock, 60 MHz in 32 bits: the library does not count them.
@@ -103,6 +107,7 @@ class Kinect final : private KinectFrames {
   void color_came(std::span<const std::uint8_t, 2 * kPixels> bytes, std::uint32_t ticks) override;
   void work();
   void stream(KinectUsb& usb);
+  void reset_if_silent(bool frames_came);
   [[nodiscard]] hal::DeviceReport report(const KinectStream& stream) const;
 
   SystemCalls& system_;
@@ -115,7 +120,7 @@ class Kinect final : private KinectFrames {
   std::condition_variable changed_;
   Phase phase_ = Phase::kStarting;
   KinectTrouble trouble_ = KinectTrouble::kNone;
-  std::uint64_t opens_ = 0, stalls_ = 0, disconnects_ = 0;
+  std::uint64_t opens_ = 0, stalls_ = 0, disconnects_ = 0, resets_ = 0;
   bool stop_ = false;
   std::optional<Thread> thread_;  ///< last: it is joined first
 };

@@ -93,6 +93,7 @@ hal::DeviceReport OpenNiDepth::report(Instant) const {
   count("disconnects", shared_.counters.disconnects);
   count("other_size", shared_.counters.other_size);
   count("slots_busy", shared_.counters.slots_busy);
+  count("resets", shared_.counters.resets);
   count("stamps_late", shared_.counters.stamps_late);
   return report;
 }

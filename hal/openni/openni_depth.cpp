@@ -95,9 +95,22 @@ void OpenNiDepth::work() {
     if (trouble == SensorTrouble::kNone && !over) stream(sensor);
     sensor.close();
     pause(options_.reopen);
+    reset_if_silent();
     const std::scoped_lock lock(mutex_);
     if (stop_ || shared_.phase == Phase::kEnded) return;
   }
+}
+
+void OpenNiDepth::reset_if_silent() {
+  if (index_) options_.last_resort.frame_came();
+  index_.reset();
+  if (!options_.reset || !options_.last_resort.due({system_.monotonic_ns()})) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (stop_) return;
+    ++shared_.counters.resets;
+  }
+  options_.reset();
 }
 
 void OpenNiDepth::stream(Sensor& sensor) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "hal/api/device_clock.hpp"
 #include "hal/api/device_report.hpp"
 #include "hal/api/frame_slots.hpp"
+#include "hal/api/last_resort.hpp"
 #include "hal/openni/sensor.hpp"
 #include "platform/linux/system_calls.hpp"
 #include "platform/linux/thread.hpp"
@@ -23,6 +25,8 @@ struct OpenNiDepthOptions {
   Duration stall = milliseconds(1000);         ///< without a frame for so long, the device is opened again
   Duration reopen = milliseconds(1000);
   Duration boot_wait = milliseconds(5000);  ///< how long make() waits for the first opening to end, well or not
+  hal::LastResort last_resort{};
+  std::function<void()> reset{};  ///< of the device on its bus, when opening it again did not help; may block
 };
 
 struct OpenNiCounters {
@@ -30,6 +34,7 @@ struct OpenNiCounters {
   std::uint64_t other_size = 0;  ///< frames of another size than asked for; in StreamCounters::lost
   std::uint64_t slots_busy = 0;  ///< frames not kept, because a job was reading the slot; in lost
   std::uint64_t stamps_late = 0;
+  std::uint64_t resets = 0;
 };
 
 /// The library blocks and makes threads of its own, so one thread of ours opens, waits, copies, and opens again; the
@@ -70,6 +75,7 @@ class OpenNiDepth final : public hal::DepthCamera, public hal::ReportingDevice {
   OpenNiDepth(SystemCalls& system, const OpenNiDepthOptions& options) : system_(system), options_(options) {}
   void work();
   void stream(Sensor& sensor);
+  void reset_if_silent();
   void accept(const Sensor& sensor, const SensorFrame& frame);
   void pause(Duration time);
   void take_up(const SensorInfo& info);

@@ -32,7 +32,8 @@ TEST_CASE("devices that are configured and not there are named with what to do",
   const ProgramResult run = folder.run({"check", "--config", "cart.yaml"});
   CHECK(run.exit_code == 4);
   CHECK_THAT(run.out, Contains("usb-nothing-index0: there is no such device") && Contains("to do:") &&
-                          Contains("panel          missing") && Contains("warning") && Contains("glass"));
+                          Contains("panel          missing") && Contains("warning") && Contains("glass") &&
+                          Contains("usb"));
   folder.write("cart.yaml", "panel: {start_input: 1}\n");
   const ProgramResult doubled = folder.run({"check", "--config", "cart.yaml"});
   CHECK(doubled.exit_code == 3);

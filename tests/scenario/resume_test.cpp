@@ -24,6 +24,22 @@ TEST_CASE("a part of the job is nothing to resume", "[scenario]") {
   CHECK_THAT(run.err, Contains("--resume") && Contains("--only"));
 }
 
+TEST_CASE("a service that was started without a device leaves no folder; a job that began does", "[scenario]") {
+  const JobFolder folder;
+  const auto start = [&](const char* faults) {
+    return folder.run({"run", "--cell", "empty", "--seed", "1", "--sensor", "fast", "--resume", "--faults", faults});
+  };
+  const ProgramResult missing = start("depth.stall_at=0");
+  CHECK(missing.exit_code == 4);
+  CHECK_THAT(missing.err, Contains("E5001"));
+  CHECK(folder.names("runs").empty());
+  const ProgramResult stopped = start("operator.stop_at=3");
+  INFO(stopped.err);
+  CHECK(stopped.exit_code == 6);
+  REQUIRE(folder.names("runs").size() == 1);
+  CHECK(std::filesystem::exists(folder / ("runs/" + folder.names("runs").front()) / "result.json"));
+}
+
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
   JobFolder folder;
   folder.options.signal_at = "view 5: ";

@@ -23,6 +23,7 @@ const std::vector<Rule> kRules = {
     {"hal/ur/", {"hal/ur/", "hal/api/", "platform/"}},
     {"hal/freenect/", {"hal/freenect/", "hal/api/", "platform/"}},
     {"hal/openni/", {"hal/openni/", "hal/api/", "platform/"}},
+    {"hal/usb/", {"hal/usb/", "hal/api/", "platform/"}},
     {"hal/v4l2/", {"hal/v4l2/", "hal/api/", "platform/"}},
     {"hal/sim/", {"hal/sim/", "hal/api/", "platform/", "algorithms/"}},
     {"app/main.cpp", {"app/", "hal/", "platform/", "algorithms/"}},

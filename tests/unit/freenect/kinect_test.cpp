@@ -1,6 +1,7 @@
 /// The Kinect against a libfreenect of our own, in real time.
 #include "hal/freenect/kinect.hpp"
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <thread>
 #include <vector>
@@ -132,6 +133,24 @@ TEST_CASE("a Kinect that stalls, in one camera or both, or goes away is lost and
   mend();
   CHECK(rig.becomes(DeviceState::kReady, 4));
   CHECK(rig.run(rig.kinect->depth(), 4, 3).size() == 3);
+}
+
+TEST_CASE("a Kinect of which one camera stays silent is reset in the end", "[freenect]") {
+  mend();
+  std::atomic<int> resets{0};
+  KinectOptions options = quick();
+  options.last_resort = hal::LastResort(milliseconds(800), 1);
+  options.reset = [&] {
+    ++resets;
+    fake_kinect().stalled = false;
+  };
+  Rig rig(options);
+  CHECK(rig.run(rig.kinect->depth(), 4, 40).size() == 40);
+  CHECK(resets == 0);
+  fake_kinect().stalled = true;
+  CHECK(rig.becomes(DeviceState::kLost, 3));
+  CHECK(rig.becomes(DeviceState::kReady, 8));
+  CHECK(resets == 1);
 }
 
 TEST_CASE("a Kinect that cannot be used says why", "[freenect]") {

@@ -5,6 +5,7 @@
 #include <OpenNI.h>
 #include <dlfcn.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <thread>
@@ -163,6 +164,25 @@ TEST_CASE("a stalled sensor is found by our own clock, and used again when it go
   sensor.stalled = false;
   CHECK(rig.becomes(DeviceState::kReady, 4));
   CHECK(rig.camera->more_counters().opens >= 2);
+}
+
+TEST_CASE("a sensor that stays silent however often it is opened is reset, one that gives frames is not", "[openni]") {
+  test::TestDepth& sensor = virtual_sensor();
+  std::atomic<int> resets{0};
+  OpenNiDepthOptions options = small_sensor();
+  options.last_resort = hal::LastResort(milliseconds(1000), 1);
+  options.reset = [&] {
+    ++resets;
+    sensor.stalled = false;  // that helped
+  };
+  Rig rig(options);
+  rig.run(3, 60);
+  CHECK(resets == 0);
+  sensor.stalled = true;
+  CHECK(rig.becomes(DeviceState::kLost, 3));
+  CHECK(rig.becomes(DeviceState::kReady, 8));
+  CHECK(resets == 1);
+  CHECK(rig.camera->more_counters().resets == 1);
 }
 
 TEST_CASE("a sensor that is unplugged is lost although its driver goes on, and comes back", "[openni]") {
