@@ -8,6 +8,7 @@
 #include "app/cli/exit_codes.hpp"
 #include "app/config/board_config.hpp"
 #include "app/wiring/cell_grading.hpp"
+#include "app/wiring/job_site.hpp"
 #include "app/wiring/network_arm.hpp"
 #include "app/wiring/real_devices.hpp"
 #include "hal/sim/simulated_cell.hpp"
@@ -41,7 +42,7 @@ int run_check(const CheckCommand& command) {
   std::unique_ptr<NetworkArm> robot;
   auto checks = real_device_checks(config);
   if (!checks) return fail(checks.error());
-  if (config.robot.given()) robot = check_robot(config, narrator, *checks);
+  if (names_network_robot(config)) robot = check_robot(config, narrator, *checks);
   const bool simulated = checks->empty();
   auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), true, "", config.workers,
                                         configured_boards(config), config.depth.sensor});
