@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <string>
 #include <system_error>
 
@@ -17,12 +15,10 @@
 #include "app/shell/replay.hpp"
 #include "app/wiring/run_check.hpp"
 #include "app/wiring/run_job.hpp"
-#include "hal/sim/cell_file.hpp"
+#include "app/wiring/simulated_ur.hpp"
 #include "hal/sim/faults.hpp"
-#include "hal/sim/ur_controller/tcp_service.hpp"
 #include "hal/ur/control_script.hpp"
 #include "platform/linux/files.hpp"
-#include "platform/linux/process.hpp"
 
 namespace firstlook {
 namespace {
@@ -31,56 +27,6 @@ namespace {
 int run_campaign_of(const CampaignCommandOptions& options) {
   if (const auto faults = sim::parse_faults(options.faults); !faults) return fail(faults.error());
   return run_campaign_command(options);
-}
-
-/// HOST or HOST:PORT; without one the port of the External Control URCap.
-Result<sim::ur::ExternalControl> external_control_of(const std::string& text) {
-  const std::size_t colon = text.rfind(':');
-  int port = 50002;
-  if (colon != std::string::npos) {
-    const auto [end, error] = std::from_chars(text.data() + colon + 1, text.data() + text.size(), port);
-    if (error != std::errc{} || end != text.data() + text.size() || port < 1 || port > 65535) {
-      return failure(Fault::kUsage, "--external-control {}: no port after the colon", text);
-    }
-  }
-  return sim::ur::ExternalControl{text.substr(0, colon), static_cast<std::uint16_t>(port)};
-}
-
-int run_ur_sim(const UrSimCommand& command) {
-  sim::ur::SimulatedUrOptions options;
-  std::string model = command.model;
-  if (!command.cell.empty()) {
-    const auto scene = sim::load_cell(command.cell, command.seed);
-    if (!scene) return fail(scene.error());
-    model = scene->arm.name.view();
-    options.start_rad = scene->start_rad;
-  }
-  const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);
-  if (!identity) return fail(identity.error());
-  options.running = command.running || command.play_after_s >= 0;
-  for (const std::string& path : command.programs) {
-    const Result<std::string> script = read_text_file(path, sim::ur::kScriptBytesMax);
-    if (!script) return fail(script.error());
-    options.programs.push_back({std::filesystem::path(path).stem().string() + ".urp", *script, {}});
-  }
-  std::string asked = command.external_control;
-  if (asked.empty() && command.play_after_s >= 0) asked = "127.0.0.1";
-  if (!asked.empty()) {
-    const auto external = external_control_of(asked);
-    if (!external) return fail(external.error());
-    options.programs.push_back({"external_control.urp", "", *external});
-  }
-  sim::ur::SimulatedUr robot(*identity, options);
-  catch_stop_signals();
-  const Status served =
-      sim::ur::serve_on_tcp(robot, {command.host, command.port_offset, !command.cell.empty(), command.play_after_s});
-  if (served) return kExitDone;
-  std::fprintf(
-      stderr,
-      "firstlook: E%d %s\n      Give --host an address of this computer; a port that is taken: end the program "
-      "that has it, or choose another --port-offset. Ports below 1024 need root.\n",
-      static_cast<int>(served.error().fault), std::string(served.error().detail()).c_str());
-  return exit_code_of(served.error());
 }
 
 int run_ur_script(const UrScriptCommand& command) {

@@ -98,7 +98,8 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
   run_app->add_option("--robot", robot,
                       "address of a Universal Robots controller that moves the arm (robot.host), at the pace of the "
-                      "clock; what the cameras see of it is simulated: `firstlook ur-sim --cell ...` there");
+                      "clock; what the cameras see of it is simulated: `firstlook ur-sim --cell ...` there, with "
+                      "--lockstep in virtual time; simulated: such a controller in this process");
   run_app->add_flag("--record", run.record,
                     "keep the views of the board as a dataset that `firstlook calibrate` reads");
   run_app->add_flag("--resume", run.resume,
@@ -237,7 +238,12 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                          "the cameras of `firstlook run --robot`; --seed as there");
   ur_sim_app->add_option("--play-after", ur_sim.play_after_s,
                          "so many seconds after the start somebody presses Play on external_control.urp, again every "
-                         "3 s until it runs");
+                         "3 s until it runs; with --lockstep once, in the job's time, 0.5 if not given");
+  ur_sim_app
+      ->add_flag("--lockstep", ur_sim.lockstep,
+                 "with --cell: the robot's time is the virtual one of `firstlook run --robot`, so that a run of two "
+                 "processes gives the same bytes as one with `--robot simulated`")
+      ->needs(ur_sim_app->get_option("--cell"));
 
   UrScriptCommand ur_script;
   CLI::App* ur_script_app =

@@ -58,6 +58,7 @@ struct UrSimCommand {
   std::string external_control;       ///< HOST or HOST:PORT; empty: no such program
   std::string cell;                   ///< where the arm stands; its true joints are told to the cell's cameras
   double play_after_s = -1;           ///< somebody presses Play; below 0: nobody
+  bool lockstep = false;              ///< its time is that of `firstlook run --robot`
 };
 
 using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,

@@ -36,6 +36,9 @@ class JobSite {
 [[nodiscard]] Result<std::unique_ptr<JobSite>> open_real_site(const RunCommand& command, Config& config,
                                                               Narrator& narrator);
 
+/// Whether `robot.host` names a controller on the network, rather than none or one in this process.
+[[nodiscard]] bool names_network_robot(const Config& config);
+
 /// Whether the configuration names cameras: then a job runs on the real cart.
 [[nodiscard]] bool names_real_cart(const Config& config);
 

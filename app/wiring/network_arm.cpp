@@ -8,6 +8,7 @@
 
 #include "algorithms/kinematics/factory_kinematics.hpp"
 #include "hal/ur/modes.hpp"
+#include "hal/ur/tcp_network.hpp"
 
 namespace firstlook {
 
@@ -37,16 +38,33 @@ NetworkArm::NetworkArm() = default;
 NetworkArm::~NetworkArm() = default;
 
 Result<std::unique_ptr<NetworkArm>> NetworkArm::connect(const Config& config, Narrator& narrator) {
+  auto network = std::make_unique<ur::TcpNetwork>();
+  const Status opened =
+      network->open({config.robot.host, config.robot.port_offset, static_cast<std::uint16_t>(config.robot.program_port),
+                     static_cast<std::uint16_t>(config.robot.control_port)});
+  if (!opened) return std::unexpected(opened.error());
+  std::string own_host = config.robot.own_address;
+  if (own_host == "auto") {
+    const auto own = network->own_address();
+    if (!own) return failure(own.error().fault, "robot at {}: {}", config.robot.host, own.error().detail());
+    own_host = *own;
+  }
+  RealClock clock;
+  return connect(config, narrator, std::move(network), clock, own_host);
+}
+
+Result<std::unique_ptr<NetworkArm>> NetworkArm::connect(const Config& config, Narrator& narrator,
+                                                        std::unique_ptr<ur::Network> network, Clock& clock,
+                                                        const std::string& own_host) {
   std::unique_ptr<NetworkArm> arm(new NetworkArm);
   arm->notices_ = std::make_unique<Notices>(narrator);
-  ur::NetworkRobotOptions options;
-  options.network = {config.robot.host, config.robot.port_offset, static_cast<std::uint16_t>(config.robot.program_port),
-                     static_cast<std::uint16_t>(config.robot.control_port)};
-  options.own_address = config.robot.own_address;
-  options.arm = config.arm.model;
-  options.payload_kg = config.robot.payload_kg;
+  arm->network_ = std::move(network);
   arm->host_ = config.robot.host;
-  auto connected = ur::NetworkRobot::connect(options, arm->notices_.get());
+  ur::NetworkRobotOptions options;
+  options.host = config.robot.host;
+  options.robot = {config.arm.model, own_host, static_cast<std::uint16_t>(config.robot.control_port)};
+  options.payload_kg = config.robot.payload_kg;
+  auto connected = ur::NetworkRobot::connect(*arm->network_, clock, options, arm->notices_.get());
   if (!connected) return std::unexpected(connected.error());
   arm->robot_ = std::move(*connected);
   const ur::RobotIdentity& identity = arm->robot_->identity();

@@ -18,9 +18,15 @@ namespace firstlook {
 
 class NetworkArm final : public hal::ReportingDevice {
  public:
-  /// Connects to `config.robot.host`, identifies it and says so. Errors: those of ur::NetworkRobot::connect, and
-  /// kConfigBadValue for kinematics that are not those of the configured model.
+  /// Connects to `config.robot.host` by TCP, identifies it and says so. Errors: those of ur::NetworkRobot::connect,
+  /// kDeviceMissing for ports of ours that are taken, and kConfigBadValue for kinematics that are not those of the
+  /// configured model.
   [[nodiscard]] static Result<std::unique_ptr<NetworkArm>> connect(const Config& config, Narrator& narrator);
+  /// The same on another network, with its clock until the job begins.
+  /// @param own_host  this computer as the controller sees it
+  [[nodiscard]] static Result<std::unique_ptr<NetworkArm>> connect(const Config& config, Narrator& narrator,
+                                                                   std::unique_ptr<ur::Network> network, Clock& clock,
+                                                                   const std::string& own_host);
   ~NetworkArm() override;
 
   [[nodiscard]] hal::RobotArm& arm() { return robot_->robot(); }
@@ -38,6 +44,7 @@ class NetworkArm final : public hal::ReportingDevice {
   [[nodiscard]] static Result<ArmModel> measure(const ur::RobotIdentity& robot, const Config& config);
 
   std::unique_ptr<Notices> notices_;
+  std::unique_ptr<ur::Network> network_;
   std::unique_ptr<ur::NetworkRobot> robot_;
   ArmModel model_;
   std::string host_;

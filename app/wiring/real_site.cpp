@@ -1,5 +1,6 @@
 #include <numbers>
 
+#include "app/wiring/cell_robot.hpp"
 #include "app/wiring/job_site.hpp"
 #include "app/wiring/network_arm.hpp"
 #include "app/wiring/real_devices.hpp"
@@ -50,15 +51,16 @@ Status refuse_what_does_not_fit(const RunCommand& command, const Config& config)
                    : command.fast_sensor ? "--sensor fast"
                                          : "--faults");
   }
-  const std::pair<const char*, bool> wanted[] = {{"robot.host", config.robot.given()},
+  const std::pair<const char*, bool> wanted[] = {{"robot.host", names_network_robot(config)},
                                                  {"camera.device", config.camera.device != "none"},
                                                  {"depth.device", config.depth.device != "none"}};
   for (const auto& [key, given] : wanted) {
     if (!given) {
-      return failure(Fault::kConfigBadValue,
-                     "{} is none: a job takes robot.host, camera.device and depth.device together, or none of them for "
-                     "a simulated cell (`firstlook check` asks single devices)",
-                     key);
+      return failure(
+          Fault::kConfigBadValue,
+          "{} names no device: a job takes robot.host, camera.device and depth.device together, or none of them for "
+          "a simulated cell (`firstlook check` asks single devices)",
+          key);
     }
   }
   if (const Status fits = refuse_other_arms(config); !fits) return fits;
@@ -74,6 +76,10 @@ Status refuse_what_does_not_fit(const RunCommand& command, const Config& config)
 }
 
 }  // namespace
+
+bool names_network_robot(const Config& config) {
+  return config.robot.given() && config.robot.host != CellRobot::kInProcess;
+}
 
 bool names_real_cart(const Config& config) { return config.camera.device != "none" || config.depth.device != "none"; }
 

@@ -10,6 +10,7 @@
 #include "app/cli/exit_codes.hpp"
 #include "app/config/board_config.hpp"
 #include "app/wiring/cell_grading.hpp"
+#include "app/wiring/job_site.hpp"
 #include "app/wiring/network_arm.hpp"
 #include "app/wiring/real_devices.hpp"
 #include "app/wiring/usb_check.hpp"
@@ -44,7 +45,7 @@ int run_check(const CheckCommand& command) {
   std::unique_ptr<NetworkArm> robot;
   auto checks = real_device_checks(config);
   if (!checks) return fail(checks.error());
-  if (config.robot.given()) robot = check_robot(config, narrator, *checks);
+  if (names_network_robot(config)) robot = check_robot(config, narrator, *checks);
   const bool simulated = checks->empty();
   std::optional<UsbCheck> usb;
   if (config.camera.device != "none" || config.depth.device != "none") usb.emplace().add_to(*checks);

@@ -230,12 +230,7 @@ Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptio
     return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, scene->arm.joints);
   }
   ArmModel model = scene->arm;
-  if (options.feed != nullptr) {
-    if (acts_on_arm(*faults)) {
-      return failure(Fault::kUsage, "--faults: what happens to arm, link and operator is up to the robot's simulation");
-    }
-    model.dh = options.feed->true_dh();
-  }
+  if (options.feed != nullptr) model.dh = options.feed->true_dh();
   const std::optional<SensorPreset> sensor = find_sensor_preset(options.sensor);
   if (!sensor) return failure(Fault::kUsage, "no depth sensor '{}'", options.sensor);
   if (!scene->mount.depth_is_given) scene->mount.depth = sensor->intrinsics;

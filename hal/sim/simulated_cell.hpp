@@ -79,8 +79,8 @@ class SimulatedCell {
 };
 
 /// Builds a cell from its options. Errors: kCellInvalid for a cell that cannot be used, kUsage for a fault
-/// specification that is not understood or acts on an arm that is moved elsewhere, kConfigBadValue for boards that the
-/// cell has no place for, kDataMissing for a file that cannot be opened.
+/// specification that is not understood, kConfigBadValue for boards that the cell has no place for, kDataMissing for a
+/// file that cannot be opened. Faults of an arm that is moved elsewhere are up to who moves it.
 [[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options);
 
 }  // namespace firstlook::sim

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "platform/loop/clock.hpp"
-
 namespace firstlook::ur {
 namespace {
 
@@ -13,11 +11,10 @@ constexpr double kSamePayload_kg = 0.01;  // what the pendant shows
 
 /// An error of what is at this address.
 std::unexpected<Error> at_host(const NetworkRobotOptions& options, const Error& error) {
-  return failure(error.fault, "robot at {}: {}", options.network.host, error.detail());
+  return failure(error.fault, "robot at {}: {}", options.host, error.detail());
 }
 
-Result<RobotIdentity> identify(TcpNetwork& network) {
-  RealClock clock;
+Result<RobotIdentity> identify(Network& network, Clock& clock) {
   Identification identification(network);
   while (true) {
     if (const auto found = identification.poll(clock.now())) return *found;
@@ -26,10 +23,10 @@ Result<RobotIdentity> identify(TcpNetwork& network) {
 }
 
 /// The first report of the joints: RTDE works.
-Result<RtdeReport> first_report(TcpNetwork& network) {
-  RealClock clock;
+Result<RtdeReport> first_report(Network& network, Clock& clock) {
   RtdeClient rtde(network, UrRobot::kReports_hz);
-  while (clock.now() < Instant{} + kFirstReport) {
+  const Instant until = clock.now() + kFirstReport;
+  while (clock.now() < until) {
     if (const auto report = rtde.poll(clock.now())) return *report;
     clock.sleep_until(clock.now() + kLook);
   }
@@ -54,24 +51,17 @@ Status check_payload(const RtdeReport& report, double expected_kg) {
                  *report.payload_kg);
 }
 
-Result<std::unique_ptr<NetworkRobot>> NetworkRobot::connect(const NetworkRobotOptions& options, NoticeSink* notices) {
+Result<std::unique_ptr<NetworkRobot>> NetworkRobot::connect(Network& network, Clock& clock,
+                                                            const NetworkRobotOptions& options, NoticeSink* notices) {
   std::unique_ptr<NetworkRobot> made(new NetworkRobot);
-  TcpNetwork& network = made->network_;
-  if (const Status opened = network.open(options.network); !opened) return std::unexpected(opened.error());
-  UrRobotOptions robot{options.arm, options.own_address, options.network.control_port};
-  if (options.own_address == "auto") {
-    const auto own = network.own_address();
-    if (!own) return at_host(options, own.error());
-    robot.own_host = *own;
-  }
-  const auto identity = identify(network);
+  const auto identity = identify(network, clock);
   if (!identity) return at_host(options, identity.error());
   made->identity_ = *identity;
-  if (const Status fit = check_robot(*identity, {options.arm}); !fit) return at_host(options, fit.error());
-  const auto report = first_report(network);
+  if (const Status fit = check_robot(*identity, {options.robot.model}); !fit) return at_host(options, fit.error());
+  const auto report = first_report(network, clock);
   if (!report) return at_host(options, report.error());
   if (const Status fit = check_payload(*report, options.payload_kg); !fit) return at_host(options, fit.error());
-  made->robot_ = std::make_unique<UrRobot>(network, robot, notices);
+  made->robot_ = std::make_unique<UrRobot>(network, options.robot, notices);
   return made;
 }
 

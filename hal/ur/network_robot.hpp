@@ -5,32 +5,32 @@
 #include <string>
 
 #include "hal/ur/identification.hpp"
-#include "hal/ur/tcp_network.hpp"
 #include "hal/ur/ur_robot.hpp"
+#include "platform/loop/clock.hpp"
 
 namespace firstlook::ur {
 
 struct NetworkRobotOptions {
-  TcpNetworkOptions network;
-  std::string own_address = "auto";  ///< this computer's, as the controller sees it; auto: found out
-  std::string arm;                   ///< the configured model; another one is refused
-  double payload_kg = -1;            ///< that the controller must have set; below 0: any
+  std::string host;        ///< of the controller, as errors name it
+  UrRobotOptions robot{};  ///< another model than this is refused
+  double payload_kg = -1;  ///< that the controller must have set; below 0: any
 };
 
 class NetworkRobot {
  public:
-  /// Blocks for some seconds at most. Errors: kDeviceMissing: no controller, a port of ours that is taken, or software
-  /// that does not tell what is needed; kConfigBadValue: another robot or payload than configured; kProtectiveStop:
-  /// a safety mode in which nothing may move.
+  /// Takes some seconds of the clock at most. Errors: kDeviceMissing: no controller, or software that does not tell
+  /// what is needed; kConfigBadValue: another robot or payload than configured; kProtectiveStop: a safety mode in which
+  /// nothing may move.
+  /// @param network  outlives the robot
   /// @param notices  may be null; outlives the robot
-  [[nodiscard]] static Result<std::unique_ptr<NetworkRobot>> connect(const NetworkRobotOptions& options,
+  [[nodiscard]] static Result<std::unique_ptr<NetworkRobot>> connect(Network& network, Clock& clock,
+                                                                     const NetworkRobotOptions& options,
                                                                      NoticeSink* notices);
   [[nodiscard]] const RobotIdentity& identity() const { return identity_; }
   [[nodiscard]] UrRobot& robot() { return *robot_; }
 
  private:
   NetworkRobot() = default;
-  TcpNetwork network_;
   RobotIdentity identity_;
   std::unique_ptr<UrRobot> robot_;
 };

@@ -153,7 +153,8 @@ void UrRobot::follow_program(Instant now) {
 
 void UrRobot::stay(Instant now) {
   const bool listens = playing() || report_.runtime == Runtime::kResuming;
-  if (!program_.up() || !listens || now - stayed_ < kStayEvery) return;
+  // Nothing until a stop is answered: one that got lost lets the program run into its own timeout.
+  if (!program_.up() || !listens || flight_ == Flight::kStopping || now - stayed_ < kStayEvery) return;
   stayed_ = now;
   program_.send(plain_command(CommandKind::kStay, 0));
 }

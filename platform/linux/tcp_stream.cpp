@@ -110,6 +110,12 @@ bool TcpStream::send(std::string_view bytes) {
   return false;
 }
 
+void TcpStream::wait(Duration longest) {
+  if (state_ == State::kClosed) return;
+  pollfd ready{descriptor_, POLLIN, 0};
+  poll(&ready, 1, static_cast<int>(longest.ns / 1'000'000));
+}
+
 void TcpStream::close() {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;

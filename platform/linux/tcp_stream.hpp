@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "platform/core/result.hpp"
+#include "platform/core/time.hpp"
 
 namespace firstlook {
 
@@ -48,6 +49,8 @@ class TcpStream {
   [[nodiscard]] std::string_view receive(std::span<char> room);
   /// All of it or an end: a peer that does not take these few bytes now is as good as gone. False: closed.
   bool send(std::string_view bytes);
+  /// Blocks until something comes or the connection ends, for so long at most.
+  void wait(Duration longest);
   void close();
 
  private:

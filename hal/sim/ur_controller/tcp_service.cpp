@@ -3,6 +3,9 @@
 #include <cstdio>
 #include <map>
 
+#include "hal/sim/ur_controller/lockstep.hpp"
+#include "hal/sim/ur_controller/stepped_service.hpp"
+#include "hal/sim/ur_controller/truth_session.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/linux/tcp.hpp"
 #include "platform/linux/wakeup.hpp"
@@ -12,11 +15,18 @@ namespace {
 
 constexpr std::size_t kUnreadMax = 2 << 20;
 constexpr std::int64_t kPlayAgain_ns = 3'000'000'000;  // longer than a request for a program lasts
+constexpr std::int64_t kLook_ns = 200'000'000;         // for signals, while nothing comes
 constexpr std::int64_t kLateMax_ns = 500'000'000;      // after a longer sleep the cycles in between are left out
 
 class TcpService final : public TcpEvents, public script::Sockets {
  public:
-  explicit TcpService(SimulatedUr& robot) : robot_(robot) { robot_.programs().set_sockets(this); }
+  TcpService(SimulatedUr& robot, const TcpServiceOptions& options) : robot_(robot) {
+    if (options.lockstep) {
+      stepped_.emplace(robot, script_of(options));
+    } else {
+      robot_.programs().set_sockets(this);
+    }
+  }
   ~TcpService() override { robot_.programs().set_sockets(nullptr); }
   TcpService(const TcpService&) = delete;
   TcpService& operator=(const TcpService&) = delete;
@@ -43,6 +53,14 @@ class TcpService final : public TcpEvents, public script::Sockets {
     return {};
   }
 
+  /// Its time is that of the client of the private channel.
+  void run_in_lockstep() {
+    while (!stop_signal_received() && !finished()) {
+      tcp_.poll(monotonic_ns() + kLook_ns, waiting_, *this);
+      flush();
+    }
+  }
+
   void run(double play_after_s) {
     std::int64_t due_ns = monotonic_ns() + robot_.cycle().ns;
     if (play_after_s >= 0) play_at_ns_ = due_ns + static_cast<std::int64_t>(play_after_s * 1e9);
@@ -59,6 +77,8 @@ class TcpService final : public TcpEvents, public script::Sockets {
   void opened(TcpId connection, TcpId listener) override {
     if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
       dialled->second.state = State::kOpen;
+    } else if (stepped_ && ports_.at(listener) == Port::kTruth) {
+      begin_lockstep(connection);
     } else {
       session_ports_[connection] = ports_.at(listener);
       sessions_[connection] = &robot_.open(ports_.at(listener));
@@ -72,6 +92,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
       if (waiting.size() > kUnreadMax) tcp_.close(connection), dialled->second.state = State::kClosed;
       return;
     }
+    if (connection == stepper_) return take_turns(bytes);
     const auto found = sessions_.find(connection);
     if (found != sessions_.end() && !found->second->over()) found->second->receive(bytes);
   }
@@ -81,6 +102,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
       dialled->second.state = State::kClosed;  // what came before can still be read
       return;
     }
+    if (connection == stepper_) return end_lockstep();
     const auto found = sessions_.find(connection);
     if (found == sessions_.end()) return;
     robot_.close(*found->second);
@@ -118,11 +140,54 @@ class TcpService final : public TcpEvents, public script::Sockets {
     std::string received, unsent;
   };
 
+  /// What somebody at the pendant does.
+  static ControllerScript script_of(const TcpServiceOptions& options) {
+    ControllerScript script;
+    if (options.play_after_s >= 0) {
+      script.push_back({Instant{seconds(options.play_after_s).ns}, ControllerAction::kPlay});
+    }
+    return script;
+  }
+
+  void begin_lockstep(TcpId connection) {
+    if (stepper_ != 0) return tcp_.close(connection);  // one at a time keeps the time
+    stepper_ = connection;
+    to_stepper_ = kLockstepGreeting;
+    from_stepper_.clear();
+  }
+
+  void take_turns(std::string_view bytes) {
+    from_stepper_ += bytes;
+    while (true) {
+      const auto asked = first_turn(from_stepper_);
+      if (asked && !*asked) return;
+      const std::size_t at = open_turn(to_stepper_);
+      if (!asked || !stepped_->turn(**asked, to_stepper_)) {
+        std::fprintf(stderr, "ur-sim: hung up on a client in lockstep that does not know its steps\n");
+        tcp_.close(stepper_);
+        return end_lockstep();
+      }
+      close_turn(to_stepper_, at);
+      from_stepper_.erase(0, 4 + (*asked)->size());
+      static_cast<void>(tcp_.send(stepper_, to_stepper_));
+    }
+  }
+
+  void end_lockstep() {
+    stepped_->hang_up();
+    stepper_ = 0;
+    to_stepper_.clear();
+  }
+
   /// A client that asked for the shutdown has its answer first.
   [[nodiscard]] bool finished() const { return robot_.shutting_down() && waiting_.empty(); }
 
   void flush() {
     waiting_.clear();
+    if (!to_stepper_.empty()) {
+      static_cast<void>(tcp_.send(stepper_, to_stepper_));
+      if (!to_stepper_.empty()) waiting_.push_back(stepper_);
+    }
     std::vector<TcpId> done, dropped;
     for (const auto& [connection, session] : sessions_) {
       const bool alive = tcp_.send(connection, session->output());
@@ -164,6 +229,9 @@ class TcpService final : public TcpEvents, public script::Sockets {
   }
 
   SimulatedUr& robot_;
+  std::optional<SteppedService> stepped_;  ///< in lockstep
+  TcpId stepper_ = 0;                      ///< its client
+  std::string from_stepper_, to_stepper_;
   std::int64_t play_at_ns_ = INT64_MAX;
   Tcp tcp_;
   std::map<TcpId, Port> ports_;
@@ -176,12 +244,16 @@ class TcpService final : public TcpEvents, public script::Sockets {
 }  // namespace
 
 Status serve_on_tcp(SimulatedUr& robot, const TcpServiceOptions& options) {
-  TcpService service(robot);
+  TcpService service(robot, options);
   if (Status listening = service.listen(options); !listening) return listening;
   const ControllerIdentity& identity = robot.controller().identity();
-  std::fprintf(stderr, "ur-sim: %s, software %s, ready\n", std::string(identity.nominal.name).c_str(),
-               identity.version_text().c_str());
-  service.run(options.play_after_s);
+  std::fprintf(stderr, "ur-sim: %s, software %s, ready%s\n", std::string(identity.nominal.name).c_str(),
+               identity.version_text().c_str(), options.lockstep ? "; its time waits for `firstlook run`" : "");
+  if (options.lockstep) {
+    service.run_in_lockstep();
+  } else {
+    service.run(options.play_after_s);
+  }
   return {};
 }
 

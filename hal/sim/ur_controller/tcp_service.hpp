@@ -1,4 +1,4 @@
-/// A simulated controller on TCP, in real time.
+/// A simulated controller on TCP, in real time or in that of its client.
 #pragma once
 
 #include <string>
@@ -14,6 +14,9 @@ struct TcpServiceOptions {
   /// So long after the start somebody loads external_control.urp and presses Play, again every 3 s until it runs;
   /// nobody does when negative.
   double play_after_s = -1;
+  /// The robot's time is that of the client of the private channel, and stands still without one. What its programs
+  /// dial is carried there, too; Play is pressed once, so long after the job's begin.
+  bool lockstep = false;
 };
 
 /// Serves all ports until SIGINT, SIGTERM (see catch_stop_signals) or a client's `shutdown`; says on stderr which ports

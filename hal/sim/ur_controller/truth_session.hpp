@@ -12,6 +12,8 @@ namespace firstlook::sim::ur {
 // Big-endian. First kTruthGreeting and the true DH table: theta, d, a, alpha of each joint. Then 125 times a second the
 // controller's time (s) and six joint angles. Bytes of the other side: kTouched, when the body touches something.
 inline constexpr std::string_view kTruthGreeting = "FLT1";
+/// In place of it when the robot's time is that of its client: turns follow (stepped_service.hpp).
+inline constexpr std::string_view kLockstepGreeting = "FLL1";
 inline constexpr std::size_t kTruthHeadBytes = 4 + kJoints * 4 * 8;
 inline constexpr std::size_t kTruthSampleBytes = 7 * 8;
 inline constexpr char kTouched = 'T';

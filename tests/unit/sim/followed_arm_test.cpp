@@ -67,8 +67,11 @@ TEST_CASE("cameras follow the true joints and kinematics of a robot in another p
   for (int i = 0; i < 1000; ++i) robot.step();
   Server server;
   server.send(session.output());
-  ur::TruthReader reader;
-  REQUIRE(reader.connect("127.0.0.1", server.port()));
+  auto channel = ur::connect_private_channel("127.0.0.1", server.port());
+  REQUIRE(channel);
+  CHECK_FALSE(channel->lockstep);
+  ur::TcpTruth reader;
+  REQUIRE(reader.connect(std::move(channel->stream)));
 
   const ArmModel& truth = robot.controller().identity().arm;
   ArmModel model = *find_arm_model("ur5e");
@@ -100,10 +103,9 @@ TEST_CASE("a touch that is felt stops the robot protectively", "[sim]") {
 TEST_CASE("who is no such channel is refused", "[sim]") {
   Server server;
   server.send(std::string(400, 'x'));
-  ur::TruthReader reader;
-  const Status status = reader.connect("127.0.0.1", server.port());
-  REQUIRE_FALSE(status);
-  CHECK(status.error().fault == Fault::kDeviceMissing);
+  const auto channel = ur::connect_private_channel("127.0.0.1", server.port());
+  REQUIRE_FALSE(channel);
+  CHECK(channel.error().fault == Fault::kDeviceMissing);
 }
 
 }  // namespace firstlook::sim

@@ -1,0 +1,92 @@
+#include "app/wiring/cell_robot.hpp"
+
+#include "app/wiring/simulated_ur.hpp"
+#include "hal/sim/faults.hpp"
+#include "hal/sim/simulated_operator.hpp"
+#include "platform/memory/allocation_guard.hpp"
+
+namespace firstlook {
+namespace {
+
+constexpr const char* kOwnHost = "127.0.0.1";
+
+}  // namespace
+
+Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, const Config& config) {
+  if (const Status fits = refuse_other_arms(config); !fits) return std::unexpected(fits.error());
+  if (config.calibration.touch_test == "yes") {
+    return failure(Fault::kUsage, "calibration.touch_test: the simulated person leads the cell's own arm only");
+  }
+  const memory::SimulationScope simulation;
+  std::unique_ptr<CellRobot> robot(new CellRobot);
+  const Status found = config.robot.host == kInProcess ? robot->start_in_process(command, config)
+                                                       : robot->find_on_network(command, config);
+  if (!found) return std::unexpected(found.error());
+  return robot;
+}
+
+Status CellRobot::start_in_process(const RunCommand& command, const Config& config) {
+  const auto faults = sim::parse_faults(command.faults);
+  if (!faults) return std::unexpected(faults.error());
+  UrSimCommand words;
+  words.cell = config.cell;
+  words.seed = static_cast<std::uint64_t>(config.seed);
+  words.running = true;
+  words.external_control = fmt::format("{}:{}", kOwnHost, config.robot.program_port);
+  auto controller = make_simulated_ur(words);
+  if (!controller) return std::unexpected(controller.error());
+  controller_ = std::move(*controller);
+  service_ = std::make_unique<sim::ur::SteppedService>(*controller_, sim::controller_script(*faults));
+  links_ = std::make_unique<sim::ur::SteppedLinks>(
+      [this](std::string_view asked, std::string& told) { return service_->turn(asked, told); });
+  return follow_steps();
+}
+
+Status CellRobot::follow_steps() {
+  auto truth = std::make_unique<sim::ur::SteppedTruth>(*links_);
+  if (const Status connected = truth->connect(); !connected) return connected;
+  truth_ = std::move(truth);
+  return {};
+}
+
+Status CellRobot::find_on_network(const RunCommand& command, const Config& config) {
+  const auto faults = sim::parse_faults(command.faults);
+  if (!faults) return std::unexpected(faults.error());
+  if (sim::acts_on_arm(*faults)) {
+    return failure(Fault::kUsage, "--faults: what happens to arm, link and operator is up to the robot's simulation");
+  }
+  const int port = static_cast<int>(sim::ur::Port::kTruth) + config.robot.port_offset;
+  auto channel = sim::ur::connect_private_channel(config.robot.host, static_cast<std::uint16_t>(port));
+  if (!channel) return std::unexpected(channel.error());
+  if (channel->lockstep) {
+    lockstep_.emplace(std::move(channel->stream));
+    links_ = std::make_unique<sim::ur::SteppedLinks>(
+        [this](std::string_view asked, std::string& told) { return lockstep_->turn(asked, told); });
+    return follow_steps();
+  }
+  auto truth = std::make_unique<sim::ur::TcpTruth>();
+  if (const Status connected = truth->connect(std::move(channel->stream)); !connected) return connected;
+  truth_ = std::move(truth);
+  return {};
+}
+
+Status CellRobot::connect(const Config& config, Narrator& narrator) {
+  const auto keep = [&](Result<std::unique_ptr<NetworkArm>> connected) -> Status {
+    if (!connected) return std::unexpected(connected.error());
+    arm_ = std::move(*connected);
+    return {};
+  };
+  if (links_ == nullptr) return keep(NetworkArm::connect(config, narrator));
+  SteppedClock clock(*links_);
+  auto network = std::make_unique<SteppedNetwork>(*links_, static_cast<std::uint16_t>(config.robot.program_port),
+                                                  static_cast<std::uint16_t>(config.robot.control_port));
+  if (const Status kept = keep(NetworkArm::connect(config, narrator, std::move(network), clock, kOwnHost)); !kept) {
+    return kept;
+  }
+  links_->begin();
+  while (truth_->next()) continue;  // where it stood before
+  stepped_.emplace(*links_, arm_->arm());
+  return {};
+}
+
+}  // namespace firstlook

@@ -1,0 +1,17 @@
+/// A simulated UR controller as the words of `firstlook ur-sim` ask for it, and that command.
+#pragma once
+
+#include <memory>
+
+#include "app/cli/cli.hpp"
+#include "hal/sim/ur_controller/simulated_ur.hpp"
+
+namespace firstlook {
+
+/// Errors: those of the cell, of the programs' files, and kUsage for words that are not understood.
+[[nodiscard]] Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimCommand& command);
+
+/// `firstlook ur-sim`. @return the exit code
+int run_ur_sim(const UrSimCommand& command);
+
+}  // namespace firstlook
