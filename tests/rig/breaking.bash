@@ -138,20 +138,6 @@ robot_late() {
   again 90
 }
 
-# The whole reduced job, on real drivers throughout.
-whole_job() {
-  local end=$((SECONDS + $1)) state was=
-  while [ $SECONDS -lt "$end" ]; do
-    state=$(status_of | sed 's/.*"state": "\([^"]*\)", "text": "\([^"]*\)".*/\1: \2/')
-    if [ "$state" != "$was" ]; then say "  $state"; fi
-    was=$state
-    if guest "ls -d /var/lib/firstlook/runs/*/result.json >/dev/null 2>&1"; then break; fi
-    sleep 2
-  done
-  say "the job's outcome: $(guest "grep -h -m 2 -E '\"(outcome|reason)\"' /var/lib/firstlook/runs/*/result.json | tr -d '\n'")"
-  guest "journalctl -b -u firstlook -o cat --no-pager" >"$logs/whole-job.log" || true
-}
-
 break_things() {
   image "$1" "full-$1"
   say "power on, kernel $1"
