@@ -4,7 +4,7 @@ export JOBS
 ARGS ?=
 ONLY ?=
 .DEFAULT_GOAL := build
-.PHONY: build run test test-asan bench deb format tidy deps clean help
+.PHONY: build run test test-asan bench deb rig rig-short rig-power format tidy deps clean help
 
 help: ## this list
 	@echo 'make                   build/release/firstlook'
@@ -36,6 +36,26 @@ format: ## clang-format everything in place
 
 deb: deps ## build/firstlook_VERSION_ARCH.deb: program, service, rules for cameras and CAN
 	@toolchain/build release firstlook packaging_texts
+	@toolchain/package
+
+rig-short: rig-parts ## boots the package in an emulated computer: to Ready, a button, motion, a power cut; KIND=std|rt
+	@tests/rig/rig short $(or $(KIND),std)
+
+rig: rig-parts ## the same on both kernels, and everything that breaks (root)
+	@tests/rig/rig full
+
+rig-power: rig-parts ## power cuts at seeded moments; CUTS=50 SEED=1
+	@tests/rig/rig power $(or $(CUTS),50) $(or $(SEED),1)
+
+image: ## build/firstlook_VERSION_KIND.img, a disk that an industrial PC boots (root); KIND=std|rt
+	@toolchain/install-dependencies rig
+	@$(MAKE) --no-print-directory deb
+	@toolchain/image $(or $(KIND),std)
+
+.PHONY: rig-parts image
+rig-parts:
+	@toolchain/install-dependencies rig
+	@toolchain/build release firstlook packaging_texts rig_programs
 	@toolchain/package
 
 tidy: ## clang-tidy; FILES="a.cpp b.cpp" for some

@@ -1,0 +1,228 @@
+/// The cameras of a simulated cell on the guest's devices, following the arm that `firstlook ur-sim --cell` moves:
+///   rig_cameras CELL SEED VIDEO_DEVICE     feeds a v4l2loopback device, and depth through DepthWindow
+///   rig_cameras CELL SEED --describe       the lines of a firstlook.yaml and of camera_info files, for the rig
+#include <fcntl.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/sim/simulated_cell.hpp"
+#include "hal/sim/ur_controller/simulated_ur.hpp"
+#include "hal/sim/ur_controller/truth_reader.hpp"
+#include "platform/linux/process.hpp"
+#include "platform/linux/wakeup.hpp"
+#include "platform/loop/clock.hpp"
+#include "tests/rig/depth_window.hpp"
+
+namespace firstlook::rig {
+namespace {
+
+constexpr int kRate_hz = 10;
+
+int complain(const char* what, const char* why) {
+  std::fprintf(stderr, "rig_cameras: %s: %s\n", what, why);
+  return 1;
+}
+
+int complain(const char* what, const Error& error) { return complain(what, std::string(error.detail()).c_str()); }
+
+/// The device takes YUYV frames by write(2). Below 0 when it refuses.
+int open_video(const char* path, int width, int height) {
+  const int device = open(path, O_RDWR | O_CLOEXEC);
+  if (device < 0) return -1;
+  v4l2_format format{};
+  format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+  format.fmt.pix.width = static_cast<std::uint32_t>(width);
+  format.fmt.pix.height = static_cast<std::uint32_t>(height);
+  format.fmt.pix.pixelformat = V4L2_PIX_FMT_YUYV;
+  format.fmt.pix.field = V4L2_FIELD_NONE;
+  format.fmt.pix.bytesperline = static_cast<std::uint32_t>(2 * width);
+  format.fmt.pix.sizeimage = static_cast<std::uint32_t>(2 * width * height);
+  if (ioctl(device, VIDIOC_S_FMT, &format) == 0) return device;
+  close(device);
+  return -1;
+}
+
+DepthWindow* make_window() {
+  const int file = open(kDepthWindowPath, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (file < 0 || ftruncate(file, sizeof(DepthWindow)) != 0) return nullptr;
+  void* const bytes = mmap(nullptr, sizeof(DepthWindow), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  close(file);
+  return bytes == MAP_FAILED ? nullptr : static_cast<DepthWindow*>(bytes);
+}
+
+float field_of_view_rad(int pixels, double focal_px) {
+  return static_cast<float>(2 * std::atan(pixels / (2 * focal_px)));
+}
+
+/// The feed of true joints, with an eye on whether the arm moves.
+class WatchedFeed final : public sim::TrueJointFeed {
+ public:
+  explicit WatchedFeed(sim::TrueJointFeed& feed) : feed_(feed) {}
+  [[nodiscard]] const std::array<DhRow, kJointsMax>& true_dh() const override { return feed_.true_dh(); }
+  [[nodiscard]] std::optional<Sample> next() override {
+    const auto sample = feed_.next();
+    if (sample) {
+      for (int j = 0; j < sample->joints_rad.size(); ++j) {
+        if (std::abs(sample->joints_rad[j] - stood_rad_[j]) <= kStands_rad) continue;
+        stood_rad_ = sample->joints_rad;
+        moved_ns_ = monotonic_ns();
+      }
+    }
+    return sample;
+  }
+  void touched() override { feed_.touched(); }
+  [[nodiscard]] std::int64_t moved_ns() const { return moved_ns_; }
+
+ private:
+  static constexpr double kStands_rad = 1e-6;
+  sim::TrueJointFeed& feed_;
+  JointVector stood_rad_ = JointVector::zero(kJointsMax);
+  std::int64_t moved_ns_ = monotonic_ns();
+};
+
+/// Whether a picture is to be rendered: while the arm moves and once more a while after it, when it has swung out.
+/// Between that the last picture is shown again, which costs an emulated computer little.
+class Freshness {
+ public:
+  [[nodiscard]] bool wanted(std::int64_t moved_ns) {
+    constexpr std::int64_t kSwings_ns = 500'000'000;
+    const std::int64_t now_ns = monotonic_ns();
+    if (rendered_ns_ > moved_ns + kSwings_ns) return false;
+    rendered_ns_ = now_ns;
+    return true;
+  }
+
+ private:
+  std::int64_t rendered_ns_ = 0;
+};
+
+/// Feeds the devices, at most kRate_hz times a second each.
+class Feeder {
+ public:
+  Feeder(sim::SimulatedCell& cell, const WatchedFeed& arm, int video, DepthWindow& window)
+      : cell_(cell),
+        arm_(arm),
+        video_(video),
+        window_(window),
+        gray_(pixels_of(cell.color().intrinsics())),
+        depth_(pixels_of(cell.depth().intrinsics())),
+        yuyv_(2 * gray_.size(), 128) {
+    const CameraIntrinsics& k = cell.depth().intrinsics();
+    window.horizontal_fov_rad = field_of_view_rad(k.width, k.fx);
+    window.vertical_fov_rad = field_of_view_rad(k.height, k.fy);
+  }
+
+  Status turn(Instant now, std::int64_t clock_start_ns) {
+    if (const auto frame = cell_.color().poll(now)) {
+      const CameraIntrinsics& k = cell_.color().intrinsics();
+      if (color_.wanted(arm_.moved_ns())) {
+        if (const Status read = cell_.color().read(*frame, {gray_.data(), k.width, k.height}); !read) return read;
+        for (std::size_t i = 0; i < gray_.size(); ++i) yuyv_[2 * i] = gray_[i];
+      }
+      if (write(video_, yuyv_.data(), yuyv_.size()) < 0) return failure(Fault::kDiskWrite, "{}", std::strerror(errno));
+    }
+    if (const auto frame = cell_.depth().poll(now)) {
+      const CameraIntrinsics& k = cell_.depth().intrinsics();
+      if (depth_fresh_.wanted(arm_.moved_ns())) {
+        if (const Status read = cell_.depth().read(*frame, {depth_.data(), k.width, k.height}); !read) return read;
+      }
+      window_.turn.fetch_add(1, std::memory_order_acq_rel);
+      std::memcpy(window_.depth_mm, depth_.data(), sizeof window_.depth_mm);
+      ++window_.frame;
+      window_.stamp_us = static_cast<std::uint64_t>((frame->stamp.ns + clock_start_ns) / 1000);
+      window_.turn.fetch_add(1, std::memory_order_release);
+    }
+    return {};
+  }
+
+ private:
+  static std::size_t pixels_of(const CameraIntrinsics& k) {
+    return static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  }
+
+  sim::SimulatedCell& cell_;
+  const WatchedFeed& arm_;
+  Freshness color_, depth_fresh_;
+  int video_;
+  DepthWindow& window_;
+  std::vector<std::uint8_t> gray_;
+  std::vector<std::uint16_t> depth_;
+  std::vector<std::uint8_t> yuyv_;
+};
+
+int feed(sim::SimulationOptions options, const char* device) {
+  sim::ur::TruthReader truth;
+  if (const Status there = truth.connect("127.0.0.1", static_cast<std::uint16_t>(sim::ur::Port::kTruth)); !there)
+    return complain("the simulated robot", there.error());
+  WatchedFeed arm(truth);
+  options.feed = &arm;
+  const auto cell = sim::make_simulated_cell(options);
+  if (!cell) return complain("the cell", cell.error());
+  const CameraIntrinsics& color = (*cell)->color().intrinsics();
+  const int video = open_video(device, color.width, color.height);
+  if (video < 0) return complain(device, "cannot be fed with YUYV pictures; is it a v4l2loopback device?");
+  DepthWindow* const window = make_window();
+  if (window == nullptr) return complain(kDepthWindowPath, std::strerror(errno));
+  Feeder feeder(**cell, arm, video, *window);
+  catch_stop_signals();
+  const std::int64_t clock_start_ns = monotonic_ns();
+  RealClock clock;
+  while (!stop_signal_received()) {
+    if (const Status fed = feeder.turn(clock.now(), clock_start_ns); !fed) return complain("a frame", fed.error());
+    clock.sleep_until(clock.now() + milliseconds(1000 / kRate_hz));
+  }
+  return 0;
+}
+
+void print_info(const char* name, const CameraIntrinsics& k) {
+  std::printf("=== %s\n", name);
+  std::printf("image_width: %d\nimage_height: %d\ncamera_name: rig\n", k.width, k.height);
+  std::printf("camera_matrix:\n  rows: 3\n  cols: 3\n  data: [%.9g, 0, %.9g, 0, %.9g, %.9g, 0, 0, 1]\n", k.fx, k.cx,
+              k.fy, k.cy);
+  std::printf(
+      "distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [%.9g, %.9g, %.9g, "
+      "%.9g, %.9g]\n",
+      k.k1, k.k2, k.p1, k.p2, k.k3);
+}
+
+/// What an integrator would have typed in for this cell.
+int describe(const sim::SimulationOptions& options) {
+  const auto cell = sim::make_simulated_cell(options);
+  if (!cell) return complain("the cell", cell.error());
+  const sim::CellDescription& d = (*cell)->description();
+  print_info("color_info.yaml", d.color);
+  print_info("depth_info.yaml", d.depth);
+  std::printf("=== cell.yaml\ncart:\n  top_m: %.9g\n", d.cart_top_m);
+  std::printf("safe_zone:\n  radius_m: %.9g\n  height_m: %.9g\n", d.safe_zone.radius_m, d.safe_zone.height_m);
+  const Eigen::Vector3d p = d.camera_T_depth.translation();
+  std::printf("mount_m: [%.9g, %.9g, %.9g]\n", p.x(), p.y(), p.z());
+  std::printf("start_rad: [");
+  for (int j = 0; j < d.start_rad.count; ++j)
+    std::printf("%s%.9g", j == 0 ? "" : ", ", d.start_rad.values[static_cast<std::size_t>(j)]);
+  std::printf("]\n");
+  return 0;
+}
+
+}  // namespace
+}  // namespace firstlook::rig
+
+int main(int argc, char** argv) {
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: rig_cameras CELL SEED VIDEO_DEVICE|--describe\n");
+    return 2;
+  }
+  firstlook::sim::SimulationOptions options;
+  options.cell = argv[1];
+  options.seed = std::stoull(argv[2]);
+  if (std::string_view(argv[3]) == "--describe") return firstlook::rig::describe(options);
+  return firstlook::rig::feed(options, argv[3]);
+}
