@@ -40,6 +40,7 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
     const auto path = planner_.plan(arm_, body, space, pace.plan, arguments.from_rad, arguments.to_rad, options);
     if (!path) {
       result.fault = path.error().fault;
+      note_blocked(path.error());
       return;
     }
     result.found = true;
@@ -69,6 +70,10 @@ PlanResult Workbench::certify_path(const PlanArguments& arguments) {
   result.found = route_is_certified(arguments.from_rad, arguments.path, &result.margin_m);
   result.path = arguments.path;
   return result;
+}
+
+void Workbench::note_blocked(const Error& error) {
+  if (error.fault == Fault::kStartBlocked) blocked_ = error;
 }
 
 /// The waypoints of paths that the arm was sent along, the latest last; whoever uses them certifies them again.
@@ -105,6 +110,7 @@ NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
   if (!step) {
     result.blocked = step.error().fault == Fault::kStartBlocked;
     result.fault = step.error().fault;
+    note_blocked(step.error());
   } else if (!step->done && !exploring_is_faster(view_context, *step, pace, here)) {
     take_choice(result, step->path, step->gain.unknown, pace);
   }
@@ -166,6 +172,7 @@ NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
   if (!choice) {
     result.blocked = choice.error().fault == Fault::kStartBlocked;
     result.fault = choice.error().fault;
+    note_blocked(choice.error());
     return result;
   }
   result.candidates = static_cast<std::uint32_t>(choice->free);

@@ -166,6 +166,8 @@ class Workbench {
   [[nodiscard]] const ArmModel& arm() const { return arm_; }
   [[nodiscard]] PublishedSpace& published() { return published_; }
   [[nodiscard]] double last_stamp_s() const { return last_stamp_s_; }
+  /// What was in the way when a motion job last found the arm blocked where it stood; empty: none did.
+  [[nodiscard]] std::string_view blocked_by() const { return blocked_.detail(); }
 
   /// Safety rule 7: nothing is known free until it is seen again.
   void forget_known_free();
@@ -189,6 +191,7 @@ class Workbench {
   void revoke_zone();
   void take_prior(VoxelMap prior);
   void note_trail(const Path& path);
+  void note_blocked(const Error& error);
   [[nodiscard]] Route route_of(const Path& path, const Body& body, const SpeedLimits& limits) const;
   [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
   [[nodiscard]] ViewContext context(const Clearance& clearance) const;
@@ -357,6 +360,7 @@ class Workbench {
   double last_stamp_s_ = 0;
   bool sweeping_ = true;
   double expected_gain_ = 0;
+  Error blocked_;  ///< the latest kStartBlocked
   std::uint64_t frames_integrated_ = 0;
   FlawCounts frames_refused_{};
   HolesRecord holes_record_;

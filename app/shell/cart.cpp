@@ -53,10 +53,11 @@ std::string camera_link_text(const Ending& ending) {
   return text + "; only a camera on the last link is calibrated so far: mount it on the flange";
 }
 
-std::string reason_text(const RunRecord& record, const Ending& ending) {
+std::string reason_text(const RunRecord& record, const Ending& ending, std::string_view blocked_by) {
   if (!ending.has_fault) return done_text(record);
   const FaultRow& row = fault_row(ending.fault);
-  const std::string where = ending.camera_link_low > 0 ? camera_link_text(ending) : std::string();
+  std::string where = ending.camera_link_low > 0 ? camera_link_text(ending) : std::string();
+  if (ending.fault == Fault::kStartBlocked && !blocked_by.empty()) where += fmt::format("; {}", blocked_by);
   return fmt::format("E{} {}{}", static_cast<int>(ending.fault), row.text, where);
 }
 
@@ -372,7 +373,7 @@ RunRecord Cart::record() const {
   r.provenance.version = version_text();
   r.provenance.config_yaml = print_config(config_);
   r.wall = wall_record();
-  r.reason = reason_text(r, ending_);
+  r.reason = reason_text(r, ending_, bench_->blocked_by());
   if (ending_.has_fault) r.remedy = fault_row(ending_.fault).remedy;
   return r;
 }

@@ -126,6 +126,8 @@ TEST_CASE("an arm that starts outside of its safe zone does not move, and is tol
   CHECK(run.exit_code == 6);
   const Json result = folder.read_json("run/result.json");
   CHECK(begins_with(result["reason"], "E4002"));
+  CHECK_THAT(result["reason"].get<std::string>(),
+             Catch::Contains("start: ") && Catch::Contains("mm short of what must remain"));
   const std::string remedy = result["remedy"];
   CHECK(remedy.find("Jog the arm into the safe zone") != std::string::npos);
   CHECK(run.err.find(remedy) != std::string::npos);
