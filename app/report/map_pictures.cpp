@@ -257,7 +257,7 @@ std::vector<MapPicture> map_pictures(const MapPictureInputs& in) {
   pictures.push_back(whole_map(in, kFromBehind_rad, "seen from behind: from negative x and y", whole));
   pictures.push_back(whole_map(in, kFromFront_rad, "seen from the front: from positive x and y", whole));
   if (!in.places.empty()) pictures.push_back(views_in_order(in));
-  if (in.swept != nullptr) pictures.push_back(unknown_space(*in.swept, in, "after the sweep"));
+  if (in.swept != nullptr) pictures.push_back(unknown_space(*in.swept, in, "before exploration"));
   pictures.push_back(unknown_space(in.map, in, "at the end"));
   const GridGeometry& g = in.map.geometry();
   const Corners grid = corners_of(g);
@@ -265,7 +265,7 @@ std::vector<MapPicture> map_pictures(const MapPictureInputs& in) {
     if (z_m < grid.low_m.z() || z_m >= grid.high_m.z()) continue;
     const std::string group = fmt::format("Layer at {:.2f} m", z_m);
     const SliceWindow window = SliceWindow::of(g);
-    if (in.swept != nullptr) pictures.push_back(layer(*in.swept, in, z_m, window, "after the sweep", group));
+    if (in.swept != nullptr) pictures.push_back(layer(*in.swept, in, z_m, window, "before exploration", group));
     pictures.push_back(layer(in.map, in, z_m, window, "at the end", group));
   }
   return pictures;
@@ -284,7 +284,7 @@ std::vector<MapPicture> part_pictures(const MapPictureInputs& in, const NamedPar
   const SliceWindow window{middle.head<2>() - Vector2d::Constant(half), middle.head<2>() + Vector2d::Constant(half)};
   const std::string group = fmt::format("{}, layer at {:.2f} m", part.name, middle.z());
   std::vector<MapPicture> pictures;
-  pictures.push_back(layer(*in.swept, in, middle.z(), window, "after the sweep" + after_sweep, group));
+  pictures.push_back(layer(*in.swept, in, middle.z(), window, "before exploration" + after_sweep, group));
   pictures.push_back(layer(in.map, in, middle.z(), window, "at the end" + at_end, group));
   for (MapPicture& p : pictures) {
     MapPicture::Line outline{"part", {}};

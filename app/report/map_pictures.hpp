@@ -35,13 +35,13 @@ struct NamedPart {
   Eigen::Vector3d high_m = Eigen::Vector3d::Zero();
 };
 
-/// The whole map from two sides with the camera's path; the numbered views from above; what was unknown after the sweep
-/// and at the end, in space and as layers.
+/// The whole map from two sides with the camera's path; the numbered views from above; what was unknown before
+/// exploration and at the end, in space and as layers.
 [[nodiscard]] std::vector<MapPicture> map_pictures(const MapPictureInputs& inputs);
 
-/// A layer through the middle of a part, after the sweep and at the end (thesis, figures 11-9 and 11-10). Empty when
+/// A layer through the middle of a part, before exploration and at the end (thesis, figures 11-9 and 11-10). Empty when
 /// the sweep did not end or the part lies outside the map.
-/// @param after_sweep, at_end  what the captions say beside "after the sweep" and "at the end"
+/// @param after_sweep, at_end  what the captions say beside "before exploration" and "at the end"
 [[nodiscard]] std::vector<MapPicture> part_pictures(const MapPictureInputs& inputs, const NamedPart& part,
                                                     const std::string& after_sweep, const std::string& at_end);
 

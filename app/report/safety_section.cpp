@@ -107,7 +107,7 @@ std::string truth_section(const RunRecord& record) {
   for (const TruthRecord::Region& region : t.regions) {
     std::string name = region.name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    table.row({"known of what could be observed " + name + ", after the sweep and at the end",
+    table.row({"known of what could be observed " + name + ", before exploration and at the end",
                fmt::format("{:.0f} % and {:.0f} %", 100 * region.known_after_sweep, 100 * region.known)});
   }
   return section(

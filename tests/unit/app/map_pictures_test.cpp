@@ -83,16 +83,16 @@ TEST_CASE("a sweep that did not end has no pictures", "[report]") {
   const Scene scene;
   MapPictureInputs inputs = scene.inputs();
   inputs.swept = nullptr;
-  for (const MapPicture& p : map_pictures(inputs)) CHECK(p.picture.caption != "after the sweep");
+  for (const MapPicture& p : map_pictures(inputs)) CHECK(p.picture.caption != "before exploration");
   CHECK(part_pictures(inputs, {"Behind it", {0.1, 0.1, 0.1}, {0.2, 0.2, 0.2}}, "", "").empty());
 }
 
-TEST_CASE("a part is shown after the sweep and at the end, with its outline", "[report]") {
+TEST_CASE("a part is shown before exploration and at the end, with its outline", "[report]") {
   Scene scene;
   const NamedPart part{"Behind it", {0.6, -0.4, 0.0}, {0.9, 0.2, 0.3}};
   const auto pictures = part_pictures(scene.inputs(), part, ": little", ": all");
   REQUIRE(pictures.size() == 2);
-  CHECK(pictures[0].picture.caption == "after the sweep: little");
+  CHECK(pictures[0].picture.caption == "before exploration: little");
   CHECK(pictures[1].picture.caption == "at the end: all");
   CHECK(pictures[0].group == "Behind it, layer at 0.15 m");
   CHECK(pictures[0].group == pictures[1].group);

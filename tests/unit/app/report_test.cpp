@@ -295,7 +295,7 @@ TEST_CASE("the page fetches nothing and tells the essentials", "[report]") {
   CHECK(page.find("url(") == std::string::npos);
   CHECK_THAT(page, Contains("class=\"banner good\"") && Contains("84.10") && Contains("ros2 run tf2_ros"));
   CHECK_THAT(page, Contains("occluded: something stands between") && Contains("out of range: nearer") &&
-                       Contains("E5005") && Contains("observed behind box, after the sweep"));
+                       Contains("E5005") && Contains("observed behind box, before exploration"));
   std::size_t pictures = 0;
   for (std::size_t at = 0; (at = page.find("data:image/", at)) != std::string::npos; ++at) ++pictures;
   CHECK(pictures == 19);

@@ -209,7 +209,7 @@ RunRecord make_record() {
   r.intrinsics = kCamera;
   for (int i = 0; i < 16; ++i) r.calibration_views.push_back(calibration_view(i, random));
   r.mapping = mapping();
-  r.map_pictures = {map_picture("after the sweep", "Layer at 0.40 m"), map_picture("at the end", "Layer at 0.40 m"),
+  r.map_pictures = {map_picture("before exploration", "Layer at 0.40 m"), map_picture("at the end", "Layer at 0.40 m"),
                     map_picture("seen from behind", "The map")};
   r.safety = safety();
   r.memory = MemoryRecord{256u << 20,
