@@ -26,7 +26,7 @@ bool begins_with(const Json& text, const std::string& begin) { return text.get<s
 Json run_with(const std::string& faults, const Expected& expected, const std::vector<std::string>& more = {},
               const std::string& config = {}) {
   const JobFolder folder;
-  folder.write("short.yaml", "explore: {views_max: 2}\n" + config);
+  folder.write("short.yaml", "explore: {views_max: 12}\n" + config);
   std::vector<std::string> words = {"--config", "short.yaml", "--faults", faults};
   words.insert(words.end(), more.begin(), more.end());
   const ProgramResult run = folder.run_job("run", words);
@@ -48,7 +48,7 @@ double phase_start_s(const Json& result, const std::string& name) {
 }
 
 /// When mapping begins in this job: where a run of the calibration alone leaves off. Mapping takes longer than the
-/// 20 s at most that the tests add to it.
+/// 20 s at most that the tests add to it, with the views that run_with() allows.
 double mapping_start_s() {
   static const double start_s = [] {
     const JobFolder folder;

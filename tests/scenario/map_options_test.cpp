@@ -12,7 +12,7 @@ namespace {
 /// A job with a short exploration and these keys besides.
 Json run_with(const std::string& config) {
   const JobFolder folder;
-  folder.write("keys.yaml", "explore: {views_max: 3}\n" + config);
+  folder.write("keys.yaml", "explore: {views_max: 16}\n" + config);
   const ProgramResult run = folder.run_job("run", {"--config", "keys.yaml"});
   INFO(config << "\n" << run.err);
   CHECK(run.exit_code == 0);
@@ -60,7 +60,7 @@ TEST_CASE("options of the map are off by default and do what they say", "[scenar
 TEST_CASE("colours, labels and sensors of voxels", "[scenario]") {
   const JobFolder folder;
   const auto run = [&](const std::string& planes) {
-    folder.write(planes + ".yaml", "explore: {views_max: 3}\nmap: {planes: \"" + planes + "\"}\n");
+    folder.write(planes + ".yaml", "explore: {views_max: 16}\nmap: {planes: \"" + planes + "\"}\n");
     const ProgramResult done = folder.run_job(planes, {"--config", planes + ".yaml"});
     INFO(done.err);
     CHECK(done.exit_code == 0);

@@ -42,7 +42,7 @@ TEST_CASE("a service that was started without a device leaves no folder; a job t
 
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
   JobFolder folder;
-  folder.options.signal_at = "view 5: ";
+  folder.options.signal_at = "view 6: expecting";
   folder.options.signal = SIGKILL;
   const ProgramResult killed = folder.run_job("runs/first");
   REQUIRE(killed.exit_code == 128 + SIGKILL);
