@@ -12,6 +12,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hal/sim/simulated_cell.hpp"
@@ -160,8 +161,10 @@ class Feeder {
 };
 
 int feed(sim::SimulationOptions options, const char* device) {
-  sim::ur::TruthReader truth;
-  if (const Status there = truth.connect("127.0.0.1", static_cast<std::uint16_t>(sim::ur::Port::kTruth)); !there)
+  auto channel = sim::ur::connect_private_channel("127.0.0.1", static_cast<std::uint16_t>(sim::ur::Port::kTruth));
+  if (!channel) return complain("the simulated robot", channel.error());
+  sim::ur::TcpTruth truth;
+  if (const Status there = truth.connect(std::move(channel->stream)); !there)
     return complain("the simulated robot", there.error());
   WatchedFeed arm(truth);
   options.feed = &arm;
