@@ -1,7 +1,4 @@
 /// A driver of OpenNI 2 with one depth sensor that shows what another process wrote into a DepthWindow.
-#define XN_NEW(type, ...) new type(__VA_ARGS__)
-#define XN_DELETE(pointer) delete (pointer)
-#include <Driver/OniDriverAPI.h>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -11,6 +8,7 @@
 #include <thread>
 
 #include "tests/rig/depth_window.hpp"
+#include "tests/support/openni_driver/depth_stream.hpp"
 
 namespace firstlook::rig {
 namespace {
@@ -28,59 +26,20 @@ const DepthWindow* open_window() {
   return bytes == MAP_FAILED ? nullptr : static_cast<const DepthWindow*>(bytes);
 }
 
-template <typename T>
-OniStatus give(const T& value, void* data, int* size) {
-  if (*size < static_cast<int>(sizeof value)) return ONI_STATUS_BAD_PARAMETER;
-  std::memcpy(data, &value, sizeof value);
-  *size = sizeof value;
-  return ONI_STATUS_OK;
-}
-
-class WindowStream final : public oni::driver::StreamBase {
+class WindowStream final : public test::DepthStreamBase {
  public:
-  explicit WindowStream(const DepthWindow& window) : window_(window) {}
+  explicit WindowStream(const DepthWindow& window)
+      : DepthStreamBase(g_mode, window.horizontal_fov_rad, window.vertical_fov_rad), window_(window) {}
   ~WindowStream() override { stop(); }
-  OniStatus start() override {
-    runs_ = true;
-    thread_ = std::thread([this] { deliver(); });
-    return ONI_STATUS_OK;
-  }
-  void stop() override {
-    runs_ = false;
-    if (thread_.joinable()) thread_.join();
-  }
-  OniBool isPropertySupported(int property) override {
-    return property == ONI_STREAM_PROPERTY_CROPPING || property == ONI_STREAM_PROPERTY_VIDEO_MODE ||
-           property == ONI_STREAM_PROPERTY_HORIZONTAL_FOV || property == ONI_STREAM_PROPERTY_VERTICAL_FOV ||
-           property == ONI_STREAM_PROPERTY_MAX_VALUE || property == ONI_STREAM_PROPERTY_MIRRORING;
-  }
-  OniStatus getProperty(int property, void* data, int* size) override {
-    switch (property) {
-      case ONI_STREAM_PROPERTY_CROPPING:
-        return give(OniCropping{}, data, size);
-      case ONI_STREAM_PROPERTY_VIDEO_MODE:
-        return give(g_mode, data, size);
-      case ONI_STREAM_PROPERTY_HORIZONTAL_FOV:
-        return give(window_.horizontal_fov_rad, data, size);
-      case ONI_STREAM_PROPERTY_VERTICAL_FOV:
-        return give(window_.vertical_fov_rad, data, size);
-      case ONI_STREAM_PROPERTY_MAX_VALUE:
-        return give(10000, data, size);
-      case ONI_STREAM_PROPERTY_MIRRORING:
-        return give(OniBool{FALSE}, data, size);
-      default:
-        return ONI_STATUS_NOT_SUPPORTED;
-    }
-  }
   OniStatus setProperty(int property, const void*, int) override {
     const bool known = property == ONI_STREAM_PROPERTY_VIDEO_MODE || property == ONI_STREAM_PROPERTY_MIRRORING;
     return known ? ONI_STATUS_OK : ONI_STATUS_NOT_SUPPORTED;
   }
 
  private:
-  void deliver() {
+  void deliver() override {
     std::uint32_t seen = window_.frame;
-    while (runs_) {
+    while (runs()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(3));
       if (window_.frame == seen) continue;
       OniFrame* const frame = getServices().acquireFrame();
@@ -92,22 +51,13 @@ class WindowStream final : public oni::driver::StreamBase {
       std::atomic_thread_fence(std::memory_order_acquire);
       if (before % 2 == 0 && window_.turn.load(std::memory_order_relaxed) == before) {
         seen = static_cast<std::uint32_t>(frame->frameIndex);
-        frame->sensorType = ONI_SENSOR_DEPTH;
-        frame->videoMode = g_mode;
-        frame->width = kDepthWidth;
-        frame->height = kDepthHeight;
-        frame->stride = kDepthWidth * 2;
-        frame->croppingEnabled = FALSE;
-        frame->dataSize = frame->stride * frame->height;
-        raiseNewFrame(frame);
+        raise(frame);
       }
       getServices().releaseFrame(frame);
     }
   }
 
   const DepthWindow& window_;
-  std::thread thread_;
-  std::atomic<bool> runs_{false};
 };
 
 class WindowDevice final : public oni::driver::DeviceBase {

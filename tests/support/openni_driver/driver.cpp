@@ -1,12 +1,9 @@
 /// A driver of OpenNI 2 with one virtual depth sensor: 64 x 48, 30 frames a second.
-#define XN_NEW(type, ...) new type(__VA_ARGS__)
-#define XN_DELETE(pointer) delete (pointer)
-#include <Driver/OniDriverAPI.h>
-
 #include <chrono>
 #include <cstring>
 #include <thread>
 
+#include "tests/support/openni_driver/depth_stream.hpp"
 #include "tests/support/openni_driver/test_depth.hpp"
 
 extern "C" {
@@ -15,6 +12,7 @@ __attribute__((visibility("default"))) firstlook::test::TestDepth firstlook_test
 
 namespace {
 
+using firstlook::test::give;
 using firstlook::test::kTestDepthHeight;
 using firstlook::test::kTestDepthWidth;
 using firstlook::test::test_depth_mm;
@@ -23,50 +21,12 @@ constexpr int kRate_hz = 30;
 OniVideoMode g_mode{ONI_PIXEL_FORMAT_DEPTH_1_MM, kTestDepthWidth, kTestDepthHeight, kRate_hz};
 OniSensorInfo g_sensor{ONI_SENSOR_DEPTH, 1, &g_mode};
 
-template <typename T>
-OniStatus give(const T& value, void* data, int* size) {
-  if (*size < static_cast<int>(sizeof value)) return ONI_STATUS_BAD_PARAMETER;
-  std::memcpy(data, &value, sizeof value);
-  *size = sizeof value;
-  return ONI_STATUS_OK;
-}
-
-class DepthStream final : public oni::driver::StreamBase {
+class DepthStream final : public firstlook::test::DepthStreamBase {
  public:
+  DepthStream()
+      : DepthStreamBase(g_mode, static_cast<float>(firstlook::test::kTestHorizontalFov_rad),
+                        static_cast<float>(firstlook::test::kTestVerticalFov_rad)) {}
   ~DepthStream() override { stop(); }
-  OniStatus start() override {
-    runs_ = true;
-    thread_ = std::thread([this] { generate(); });
-    return ONI_STATUS_OK;
-  }
-  void stop() override {
-    runs_ = false;
-    if (thread_.joinable()) thread_.join();
-  }
-  OniBool isPropertySupported(int property) override {
-    // Without cropping a recording of this stream plays no frames.
-    return property == ONI_STREAM_PROPERTY_CROPPING || property == ONI_STREAM_PROPERTY_VIDEO_MODE ||
-           property == ONI_STREAM_PROPERTY_HORIZONTAL_FOV || property == ONI_STREAM_PROPERTY_VERTICAL_FOV ||
-           property == ONI_STREAM_PROPERTY_MAX_VALUE || property == ONI_STREAM_PROPERTY_MIRRORING;
-  }
-  OniStatus getProperty(int property, void* data, int* size) override {
-    switch (property) {
-      case ONI_STREAM_PROPERTY_CROPPING:
-        return give(OniCropping{}, data, size);
-      case ONI_STREAM_PROPERTY_VIDEO_MODE:
-        return give(g_mode, data, size);
-      case ONI_STREAM_PROPERTY_HORIZONTAL_FOV:
-        return give(static_cast<float>(firstlook::test::kTestHorizontalFov_rad), data, size);
-      case ONI_STREAM_PROPERTY_VERTICAL_FOV:
-        return give(static_cast<float>(firstlook::test::kTestVerticalFov_rad), data, size);
-      case ONI_STREAM_PROPERTY_MAX_VALUE:
-        return give(10000, data, size);
-      case ONI_STREAM_PROPERTY_MIRRORING:
-        return give(OniBool{mirrored()}, data, size);
-      default:
-        return ONI_STATUS_NOT_SUPPORTED;
-    }
-  }
   OniStatus setProperty(int property, const void* data, int size) override {
     if (property == ONI_STREAM_PROPERTY_MIRRORING && size == sizeof(OniBool)) {
       OniBool on = FALSE;
@@ -78,11 +38,11 @@ class DepthStream final : public oni::driver::StreamBase {
   }
 
  private:
-  [[nodiscard]] bool mirrored() const { return mirrored_ || firstlook_test_depth.always_mirrored; }
+  [[nodiscard]] bool mirrored() const override { return mirrored_ || firstlook_test_depth.always_mirrored; }
 
-  void generate() {
+  void deliver() override {
     const auto begin = std::chrono::steady_clock::now();
-    for (int index = 1; runs_; ++index) {
+    for (int index = 1; runs(); ++index) {
       std::this_thread::sleep_until(begin + std::chrono::microseconds(1'000'000LL * index / kRate_hz));
       if (firstlook_test_depth.stalled) continue;
       if (firstlook_test_depth.skip > 0) {
@@ -93,27 +53,18 @@ class DepthStream final : public oni::driver::StreamBase {
       if (frame == nullptr) continue;
       frame->frameIndex = index;
       frame->timestamp = 5'000'000'000ULL + 1'000'000ULL * static_cast<unsigned>(index) / kRate_hz;
-      frame->sensorType = ONI_SENSOR_DEPTH;
-      frame->videoMode = g_mode;
-      frame->width = kTestDepthWidth;
-      frame->height = kTestDepthHeight;
-      frame->stride = kTestDepthWidth * 2;
-      frame->croppingEnabled = FALSE;
-      frame->dataSize = frame->stride * frame->height;
       auto* pixel = static_cast<std::uint16_t*>(frame->data);
       for (int y = 0; y < kTestDepthHeight; ++y) {
         for (int x = 0; x < kTestDepthWidth; ++x) {
           *pixel++ = test_depth_mm(static_cast<std::uint32_t>(index), mirrored() ? kTestDepthWidth - 1 - x : x, y);
         }
       }
-      raiseNewFrame(frame);
+      raise(frame);
       getServices().releaseFrame(frame);
       ++firstlook_test_depth.frames;
     }
   }
 
-  std::thread thread_;
-  std::atomic<bool> runs_{false};
   std::atomic<bool> mirrored_{true};  // as PrimeSense's are at first
 };
 
