@@ -38,6 +38,8 @@ Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimComma
     options.start_rad = scene->start_rad;
   }
   const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);
+  if (!identity && !command.cell.empty())
+    return failure(identity.error().fault, "the arm of {}: {}", command.cell, identity.error().detail());
   if (!identity) return std::unexpected(identity.error());
   const bool somebody_plays = command.play_after_s >= 0 || command.lockstep;
   options.running = command.running || somebody_plays;
