@@ -1,4 +1,6 @@
 /// Parts of the job: calibrate now, then verify or map with what was stored; and every way in which that is refused.
+#include <sstream>
+
 #include "tests/support/job_run.hpp"
 
 namespace firstlook {
@@ -151,6 +153,15 @@ TEST_CASE("views as the thesis chose them: slower to the same, and as safe", "[s
     return truth["to_95"].is_null() ? 1e9 : truth["to_95"]["time_s"].get<double>();
   };
   CHECK(time_to_95_s("firstlook") < 0.9 * time_to_95_s("thesis2014"));
+  // The sweep goes on only while it tells more than a chosen view; the thesis's goes on to its end.
+  const auto sweep_views = [&](const std::string& views) {
+    std::istringstream rows(folder.read(views + "/views.csv"));
+    int count = 0;
+    for (std::string row; std::getline(rows, row);) count += row.find(",sweep,") != std::string::npos ? 1 : 0;
+    return count;
+  };
+  CHECK(sweep_views("firstlook") == 1);
+  CHECK(sweep_views("thesis2014") > 8);
 }
 
 }  // namespace firstlook
