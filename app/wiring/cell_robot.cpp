@@ -1,7 +1,6 @@
 #include "app/wiring/cell_robot.hpp"
 
 #include "app/wiring/simulated_ur.hpp"
-#include "hal/sim/faults.hpp"
 #include "hal/sim/simulated_operator.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
@@ -18,16 +17,16 @@ Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, co
     return failure(Fault::kUsage, "calibration.touch_test: the simulated person leads the cell's own arm only");
   }
   const memory::SimulationScope simulation;
+  const auto faults = sim::parse_faults(command.faults);
+  if (!faults) return std::unexpected(faults.error());
   std::unique_ptr<CellRobot> robot(new CellRobot);
-  const Status found = config.robot.host == kInProcess ? robot->start_in_process(command, config)
-                                                       : robot->find_on_network(command, config);
+  const Status found = config.robot.host == kInProcess ? robot->start_in_process(*faults, config)
+                                                       : robot->find_on_network(*faults, config);
   if (!found) return std::unexpected(found.error());
   return robot;
 }
 
-Status CellRobot::start_in_process(const RunCommand& command, const Config& config) {
-  const auto faults = sim::parse_faults(command.faults);
-  if (!faults) return std::unexpected(faults.error());
+Status CellRobot::start_in_process(const sim::Faults& faults, const Config& config) {
   UrSimCommand words;
   words.cell = config.cell;
   words.seed = static_cast<std::uint64_t>(config.seed);
@@ -36,7 +35,7 @@ Status CellRobot::start_in_process(const RunCommand& command, const Config& conf
   auto controller = make_simulated_ur(words);
   if (!controller) return std::unexpected(controller.error());
   controller_ = std::move(*controller);
-  service_ = std::make_unique<sim::ur::SteppedService>(*controller_, sim::controller_script(*faults));
+  service_ = std::make_unique<sim::ur::SteppedService>(*controller_, sim::controller_script(faults));
   links_ = std::make_unique<sim::ur::SteppedLinks>(
       [this](std::string_view asked, std::string& told) { return service_->turn(asked, told); });
   return follow_steps();
@@ -49,10 +48,8 @@ Status CellRobot::follow_steps() {
   return {};
 }
 
-Status CellRobot::find_on_network(const RunCommand& command, const Config& config) {
-  const auto faults = sim::parse_faults(command.faults);
-  if (!faults) return std::unexpected(faults.error());
-  if (sim::acts_on_arm(*faults)) {
+Status CellRobot::find_on_network(const sim::Faults& faults, const Config& config) {
+  if (sim::acts_on_arm(faults)) {
     return failure(Fault::kUsage, "--faults: what happens to arm, link and operator is up to the robot's simulation");
   }
   const int port = static_cast<int>(sim::ur::Port::kTruth) + config.robot.port_offset;

@@ -7,6 +7,7 @@
 #include "app/cli/cli.hpp"
 #include "app/wiring/network_arm.hpp"
 #include "app/wiring/stepped_network.hpp"
+#include "hal/sim/faults.hpp"
 #include "hal/sim/ur_controller/lockstep.hpp"
 #include "hal/sim/ur_controller/stepped_service.hpp"
 #include "hal/sim/ur_controller/truth_reader.hpp"
@@ -33,8 +34,8 @@ class CellRobot {
 
  private:
   CellRobot() = default;
-  [[nodiscard]] Status start_in_process(const RunCommand& command, const Config& config);
-  [[nodiscard]] Status find_on_network(const RunCommand& command, const Config& config);
+  [[nodiscard]] Status start_in_process(const sim::Faults& faults, const Config& config);
+  [[nodiscard]] Status find_on_network(const sim::Faults& faults, const Config& config);
   [[nodiscard]] Status follow_steps();
 
   std::unique_ptr<sim::ur::SimulatedUr> controller_;  ///< in this process
