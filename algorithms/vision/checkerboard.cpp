@@ -77,16 +77,16 @@ Corners search_scaled(const cv::Mat& image, const BoardSpec& board, double scale
   if (scale < 1) cv::resize(image, scaled, cv::Size(), scale, scale, cv::INTER_AREA);
   const GrayImage picture{scaled.data, scaled.cols, scaled.rows};
   // More saddle points than one in a hundred pixels are noise, not a scene.
-  const int saddles_max = scaled.cols * scaled.rows / 100;
+  const std::size_t saddles_max = picture.size() / 100;
   const auto search = [&](const SaddlePoints& saddles) -> Corners {
-    if (saddles.count < saddle_points_min(board.corners()) || saddles.count > saddles_max) return {};
-    return find_checkerboard_lattice(picture, saddles, board).corners_px;
+    if (saddles.size() < saddle_points_min(board.corners()) || saddles.size() > saddles_max) return {};
+    return find_checkerboard_lattice(picture, saddles, board);
   };
-  Corners corners = search(find_saddle_points_full(picture));
-  if (corners.empty()) corners = search(find_saddle_points_halved(picture));
+  Corners corners = search(find_saddle_points(picture, saddles_max));
+  if (corners.empty()) corners = search(find_saddle_points_halved(picture, saddles_max));
   if (corners.empty()) {  // a small board in noise: its corners are too near for half the size
     const cv::Mat quiet = smoothed(scaled);
-    corners = search(find_saddle_points_full({quiet.data, quiet.cols, quiet.rows}));
+    corners = search(find_saddle_points({quiet.data, quiet.cols, quiet.rows}, saddles_max));
   }
   for (Eigen::Vector2d& p : corners) p = ((p.array() + 0.5) / scale - 0.5).matrix();
   return corners;

@@ -24,39 +24,37 @@ std::array<Eigen::Vector2d, 2> edge_directions(const SaddlePoint& s) {
           Eigen::Vector2d(std::cos(main_angle - beside), std::sin(main_angle - beside))};
 }
 
-/// Neighbouring corners have their dark squares on crossed diagonals.
-bool colours_alternate(const SaddlePoint& a, const SaddlePoint& b) {
-  // Twice the angle of the main curvature as a vector.
-  const Eigen::Vector2d at_a(a.xx - a.yy, 2 * a.xy), at_b(b.xx - b.yy, 2 * b.xy);
-  return at_a.dot(at_b) < -0.2 * at_a.norm() * at_b.norm();
-}
+/// Twice the angle of the main curvature as a unit vector: the diagonal on which the dark squares lie.
+Eigen::Vector2d dark_diagonal(const SaddlePoint& s) { return Eigen::Vector2d(s.xx - s.yy, 2 * s.xy).normalized(); }
 
 class Search {
  public:
   Search(GrayImage image, const SaddlePoints& saddles, const BoardSpec& board)
       : image_(image),
-        saddles_(saddles.points),
+        saddles_(saddles),
         board_(board),
-        points_(points_of(saddles.points)),
-        index_(points_, kBucket_px) {
-    for (const SaddlePoint& s : saddles_) strengths_.push_back(s.xy * s.xy - s.xx * s.yy);
+        points_(points_of(saddles)),
+        index_(points_, kBucket_px),
+        grower_(index_) {
+    for (const SaddlePoint& s : saddles_) {
+      strengths_.push_back(s.xy * s.xy - s.xx * s.yy);
+      diagonals_.push_back(dark_diagonal(s));
+    }
     for (int row = 0; row < board.inner_rows; ++row) {
       for (int column = 0; column < board.inner_columns; ++column) places_.push_back({column, row});
     }
   }
 
-  LatticeSearch run() {
-    LatticeSearch result;
+  std::vector<Eigen::Vector2d> run() {
     std::vector<bool> tried(points_.size(), false);
     int fruitless = 0;
     for (std::size_t p = 0; p < points_.size() && fruitless < kFruitlessMax; ++p) {
       if (tried[p]) continue;
       const auto seed = seed_at(p);
       if (!seed) continue;
-      const auto alternate = [&](std::size_t a, std::size_t b) { return colours_alternate(saddles_[a], saddles_[b]); };
-      const auto grown = grow_lattice(index_, *seed, {kTolerance, alternate, strengths_});
+      const auto alternate = [this](std::size_t a, std::size_t b) { return colours_alternate(a, b); };
+      const auto grown = grower_.grow(*seed, {kTolerance, alternate, strengths_});
       const int size = static_cast<int>(grown.size());
-      result.largest = std::max(result.largest, size);
       // Points of a good lattice need not be tried again; those of a small one may have had a bad start.
       if (size >= kGoodLattice) {
         for (const LatticePoint& g : grown) tried[g.point] = true;
@@ -67,12 +65,12 @@ class Search {
         std::vector<LatticeMatch> matches = match_lattice(grown, places_, turns, missing_max);
         matches.resize(std::min(matches.size(), kMatchesMax));
         for (LatticeMatch& match : matches) {
-          result.corners_px = complete(std::move(match));
-          if (!result.corners_px.empty()) return result;
+          auto corners_px = complete(std::move(match));
+          if (!corners_px.empty()) return corners_px;
         }
       }
     }
-    return result;
+    return {};
   }
 
  private:
@@ -82,10 +80,16 @@ class Search {
   static constexpr int kFruitlessMax = 4;  // large lattices that were not the board
   static constexpr std::size_t kMatchesMax = 4, kStraysMax = 8;
 
-  static std::vector<Eigen::Vector2d> points_of(const std::vector<SaddlePoint>& saddles) {
+  static std::vector<Eigen::Vector2d> points_of(const SaddlePoints& saddles) {
     std::vector<Eigen::Vector2d> points;
+    points.reserve(saddles.size());
     for (const SaddlePoint& s : saddles) points.emplace_back(s.u, s.v);
     return points;
+  }
+
+  /// Neighbouring corners have their dark squares on crossed diagonals.
+  [[nodiscard]] bool colours_alternate(std::size_t a, std::size_t b) const {
+    return diagonals_[a].dot(diagonals_[b]) < -0.2;
   }
 
   /// The corners of a match, missing ones where the others put them; empty when there is no corner at such a place.
@@ -200,50 +204,57 @@ class Search {
     return std::min(a, b) - std::max(c, d) > kContrastMin || std::min(c, d) - std::max(a, b) > kContrastMin;
   }
 
-  /// The nearest neighbour along a direction, either way, with crossed colours.
-  [[nodiscard]] std::optional<Eigen::Vector2d> step_along(std::size_t p, const Eigen::Vector2d& direction) const {
-    constexpr double kCone = 0.94;  // cosine of 20 degrees
-    std::optional<Eigen::Vector2d> best;
-    for (double radius = 2 * kBucket_px; radius <= 16 * kBucket_px && !best; radius *= 2) {
-      double nearest = radius;
-      index_.near(points_[p], radius, [&](std::size_t q) {
-        const Eigen::Vector2d step = points_[q] - points_[p];
-        const double length = step.norm(), along = step.dot(direction);
-        if (length < 3 || length >= nearest || std::abs(along) < kCone * length) return;
-        if (!colours_alternate(saddles_[p], saddles_[q])) return;
-        nearest = length;
-        best = along > 0 ? step : Eigen::Vector2d(-step);
-      });
-    }
-    return best;
-  }
-
-  /// Steps with x cross y away from the viewer (clockwise in the picture).
+  /// The nearest neighbours with crossed colours along both edges of a point, either way, with x cross y away from the
+  /// viewer (clockwise in the picture).
   [[nodiscard]] std::optional<LatticeSeed> seed_at(std::size_t p) const {
-    const auto directions = edge_directions(saddles_[p]);
-    const auto a = step_along(p, directions[0]), b = step_along(p, directions[1]);
-    if (!a || !b) return std::nullopt;
-    const double ratio = a->norm() / b->norm();
+    constexpr double kCone = 0.94;  // cosine of 20 degrees
+    constexpr double kStepMin_px = 3;
     constexpr double kRatioMax = 3.5;  // tilt shortens one of them
+    const auto directions = edge_directions(saddles_[p]);
+    std::array<std::optional<Eigen::Vector2d>, 2> steps;
+    for (double radius = 2 * kBucket_px; radius <= 16 * kBucket_px && !(steps[0] && steps[1]); radius *= 2) {
+      std::array<double, 2> nearest2{};
+      for (std::size_t k = 0; k < 2; ++k) nearest2[k] = steps[k] ? steps[k]->squaredNorm() : radius * radius;
+      index_.near(points_[p], radius, [&](std::size_t q, const Eigen::Vector2d& at) {
+        const Eigen::Vector2d step = at - points_[p];
+        const double length2 = step.squaredNorm();
+        if (length2 >= std::max(nearest2[0], nearest2[1]) || length2 < kStepMin_px * kStepMin_px) return;
+        for (std::size_t k = 0; k < 2; ++k) {
+          const double along = step.dot(directions[k]);
+          if (length2 >= nearest2[k] || along * along < kCone * kCone * length2) continue;
+          if (!colours_alternate(p, q)) return;
+          nearest2[k] = length2;
+          steps[k] = along > 0 ? step : Eigen::Vector2d(-step);
+        }
+      });
+      const auto& found = steps[0] ? steps[0] : steps[1];
+      if (found && radius > kRatioMax * found->norm()) break;  // one that is farther would not do
+    }
+    if (!steps[0] || !steps[1]) return std::nullopt;
+    const Eigen::Vector2d &a = *steps[0], &b = *steps[1];
+    const double ratio = a.norm() / b.norm();
     if (ratio > kRatioMax || ratio < 1 / kRatioMax) return std::nullopt;
-    const double turn = a->x() * b->y() - a->y() * b->x();
-    if (std::abs(turn) < 0.25 * a->norm() * b->norm()) return std::nullopt;
-    return turn > 0 ? LatticeSeed{p, *a, *b} : LatticeSeed{p, *b, *a};
+    const double turn = a.x() * b.y() - a.y() * b.x();
+    if (std::abs(turn) < 0.25 * a.norm() * b.norm()) return std::nullopt;
+    return turn > 0 ? LatticeSeed{p, a, b} : LatticeSeed{p, b, a};
   }
 
   GrayImage image_;
-  const std::vector<SaddlePoint>& saddles_;
+  const SaddlePoints& saddles_;
   const BoardSpec& board_;
   std::vector<Eigen::Vector2d> points_;
   PointIndex index_;
+  LatticeGrower grower_;
   std::vector<float> strengths_;
+  std::vector<Eigen::Vector2d> diagonals_;
   std::vector<LatticePlace> places_;
 };
 
 }  // namespace
 
-LatticeSearch find_checkerboard_lattice(GrayImage image, const SaddlePoints& saddles, const BoardSpec& board) {
-  if (saddles.points.empty()) return {};
+std::vector<Eigen::Vector2d> find_checkerboard_lattice(GrayImage image, const SaddlePoints& saddles,
+                                                       const BoardSpec& board) {
+  if (saddles.empty()) return {};
   return Search(image, saddles, board).run();
 }
 

@@ -130,6 +130,7 @@ std::vector<std::size_t> find_grid(const std::vector<Disc>& discs, const BoardSp
   std::vector<Eigen::Vector2d> centers;
   for (const Disc& d : discs) centers.push_back(d.center);
   const PointIndex index(centers, 16);
+  LatticeGrower grower(index);
   const auto places = places_of(board);
   constexpr int kSeedsMax = 300;
   int seeds = 0;
@@ -142,7 +143,8 @@ std::vector<std::size_t> find_grid(const std::vector<Disc>& discs, const BoardSp
       const double ratio = discs[b].radius_px / discs[a].radius_px;
       return ratio > 0.6 && ratio < 1.7;
     };
-    const auto grown = grow_lattice(index, *seed, {0.3, alike, {}});
+    // A larger one is matched with no target, wherever its growth would end.
+    const auto grown = grower.grow(*seed, {0.3, alike, {}, lattice_size_max(places.size())});
     double first_sum = 0;
     for (int turns = 0; turns < 4; ++turns) {
       const auto matches = match_lattice(grown, places, turns);

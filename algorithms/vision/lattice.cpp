@@ -4,46 +4,17 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <optional>
+#include <numeric>
 
 namespace firstlook {
 namespace {
 
 constexpr int kSideMax = 64;  // steps from the start each way; no target has as many
 
-/// Cells of the plane of integers around the start.
-class Field {
- public:
-  Field() : node_(static_cast<std::size_t>((2 * kSideMax + 1) * (2 * kSideMax + 1)), -1) {}
-  [[nodiscard]] static bool holds(int i, int j) { return std::abs(i) <= kSideMax && std::abs(j) <= kSideMax; }
-  [[nodiscard]] int at(int i, int j) const { return holds(i, j) ? node_[cell(i, j)] : -1; }
-  void set(int i, int j, int node) { node_[cell(i, j)] = node; }
+constexpr bool is_in_field(int i, int j) { return std::abs(i) <= kSideMax && std::abs(j) <= kSideMax; }
 
- private:
-  [[nodiscard]] static std::size_t cell(int i, int j) {
-    return static_cast<std::size_t>((j + kSideMax) * (2 * kSideMax + 1) + i + kSideMax);
-  }
-  std::vector<int> node_;
-};
-
-struct Node {
-  LatticePoint place;
-  Eigen::Vector2d px;
-  std::array<Eigen::Vector2d, 2> step;  ///< along i and j here
-};
-
-std::optional<std::size_t> best_near(const PointIndex& index, const Eigen::Vector2d& at, double radius_px,
-                                     const std::vector<bool>& used, std::span<const float> strengths) {
-  constexpr double kAtTheRim = 0.3;  // how much a candidate counts there, against one in the middle
-  std::optional<std::size_t> best;
-  double best_score = 0;
-  index.near(at, radius_px, [&](std::size_t p) {
-    const double share2 = (index.points()[p] - at).squaredNorm() / (radius_px * radius_px);
-    if (used[p] || share2 > 1) return;
-    const double score = (strengths.empty() ? 1.0 : strengths[p]) * (1 - (1 - kAtTheRim) * share2);
-    if (score > best_score) best = p, best_score = score;
-  });
-  return best;
+constexpr std::size_t field_cell(int i, int j) {
+  return static_cast<std::size_t>((j + kSideMax) * (2 * kSideMax + 1) + i + kSideMax);
 }
 
 /// The place after `quarter_turns` of the lattice.
@@ -90,83 +61,111 @@ bool goes_on_beyond(const std::vector<LatticePlace>& taken, const std::array<Ran
 }  // namespace
 
 PointIndex::PointIndex(std::span<const Eigen::Vector2d> points, double bucket_px)
-    : points_(points), bucket_px_(std::max(1.0, bucket_px)) {
+    : points_(points), per_px_(1 / std::max(1.0, bucket_px)), entries_(points.size()) {
   if (!points.empty()) {
     Eigen::Vector2d high = points[0];
     low_ = points[0];
     for (const auto& p : points) low_ = low_.cwiseMin(p), high = high.cwiseMax(p);
-    columns_ = static_cast<int>((high.x() - low_.x()) / bucket_px_) + 1;
-    rows_ = static_cast<int>((high.y() - low_.y()) / bucket_px_) + 1;
+    columns_ = static_cast<int>((high.x() - low_.x()) * per_px_) + 1;
+    rows_ = static_cast<int>((high.y() - low_.y()) * per_px_) + 1;
   }
-  buckets_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  // Sorted by counting.
+  first_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) + 1, 0);
+  for (const auto& p : points) ++first_[bucket(column(p.x()), row(p.y())) + 1];
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
   for (std::size_t p = 0; p < points.size(); ++p) {
-    buckets_[static_cast<std::size_t>(row(points[p].y()) * columns_ + column(points[p].x()))].push_back(p);
+    entries_[next[bucket(column(points[p].x()), row(points[p].y()))]++] = {points[p], static_cast<std::uint32_t>(p)};
   }
 }
 
-int PointIndex::column(double x) const {
-  return static_cast<int>(std::clamp((x - low_.x()) / bucket_px_, 0.0, columns_ - 1.0));
+LatticeGrower::LatticeGrower(const PointIndex& index)
+    : index_(index), used_(index.points().size(), 0), field_(field_cell(kSideMax, kSideMax) + 1, -1) {}
+
+int LatticeGrower::node_at(int i, int j) const { return is_in_field(i, j) ? field_[field_cell(i, j)] : -1; }
+
+const Eigen::Vector2d& LatticeGrower::px(int node) const {
+  return index_.points()[nodes_[static_cast<std::size_t>(node)].point];
 }
 
-int PointIndex::row(double y) const {
-  return static_cast<int>(std::clamp((y - low_.y()) / bucket_px_, 0.0, rows_ - 1.0));
+void LatticeGrower::add(const LatticePoint& point, const Steps& steps) {
+  used_[point.point] = 1;
+  field_[field_cell(point.i, point.j)] = static_cast<int>(nodes_.size());
+  nodes_.push_back(point);
+  steps_.push_back(steps);
 }
 
-std::vector<LatticePoint> grow_lattice(const PointIndex& index, const LatticeSeed& seed, const LatticeGrowth& how) {
-  std::vector<bool> used(index.points().size(), false);
-  Field field;
-  std::vector<Node> nodes{{{0, 0, seed.point}, index.points()[seed.point], {seed.step_i, seed.step_j}}};
-  field.set(0, 0, 0);
-  used[seed.point] = true;
+void LatticeGrower::clear() {
+  for (const LatticePoint& node : nodes_) {
+    used_[node.point] = 0;
+    field_[field_cell(node.i, node.j)] = -1;
+  }
+  nodes_.clear();
+  steps_.clear();
+}
+
+std::optional<std::size_t> LatticeGrower::best_near(const Eigen::Vector2d& at, double radius_px,
+                                                    std::span<const float> strengths) const {
+  constexpr double kAtTheRim = 0.3;  // how much a candidate counts there, against one in the middle
+  const double radius2 = radius_px * radius_px;
+  std::optional<std::size_t> best;
+  double best_score = 0;
+  index_.near(at, radius_px, [&](std::size_t p, const Eigen::Vector2d& place) {
+    const double distance2 = (place - at).squaredNorm();
+    if ((distance2 > radius2) | (used_[p] != 0)) return;
+    const double score = (strengths.empty() ? 1.0 : strengths[p]) * (1 - (1 - kAtTheRim) * (distance2 / radius2));
+    if (score > best_score) best = p, best_score = score;
+  });
+  return best;
+}
+
+/// Where the next point is looked for, from node `n` one place along (di, dj).
+Eigen::Vector2d LatticeGrower::step_from(std::size_t n, int di, int dj) const {
+  const LatticePoint& from = nodes_[n];
+  // The step that led here along the same line, else the one beside it, is the better guide.
+  const int behind = node_at(from.i - di, from.j - dj);
+  if (behind >= 0) {
+    const Eigen::Vector2d step = px(static_cast<int>(n)) - px(behind);
+    const int further = node_at(from.i - 2 * di, from.j - 2 * dj);
+    if (further < 0) return step;
+    // Perspective makes the steps of a row grow or shrink by nearly the same factor each time.
+    const double before = (px(behind) - px(further)).norm();
+    return step * std::clamp(step.norm() / std::max(1e-9, before), 0.75, 1.33);
+  }
+  for (const int side : {1, -1}) {
+    const int beside = node_at(from.i + side * dj, from.j + side * di);
+    const int ahead = node_at(from.i + di + side * dj, from.j + dj + side * di);
+    if (beside >= 0 && ahead >= 0) return px(ahead) - px(beside);
+  }
+  return (di + dj) * steps_[n][di != 0 ? 0 : 1];
+}
+
+std::span<const LatticePoint> LatticeGrower::grow(const LatticeSeed& seed, const LatticeGrowth& how) {
   constexpr std::array<std::array<int, 2>, 4> kWays = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
+  clear();
+  add({0, 0, seed.point}, {seed.step_i, seed.step_j});
+  for (std::size_t n = 0; n < nodes_.size() && nodes_.size() <= how.size_max; ++n) {
     for (const auto& [di, dj] : kWays) {
-      const Node from = nodes[n];  // a copy: the list grows
-      const int i = from.place.i + di, j = from.place.j + dj;
-      if (!Field::holds(i, j) || field.at(i, j) >= 0) continue;
-      const std::size_t axis = di != 0 ? 0 : 1;
-      const double sign = di + dj;
-      Eigen::Vector2d step = sign * from.step[axis];
-      // The step that led here along the same line, else the one beside it, is the better guide.
-      const int behind = field.at(from.place.i - di, from.place.j - dj);
-      if (behind >= 0) {
-        step = from.px - nodes[static_cast<std::size_t>(behind)].px;
-        // Perspective makes the steps of a row grow or shrink by nearly the same factor each time.
-        const int further = field.at(from.place.i - 2 * di, from.place.j - 2 * dj);
-        if (further >= 0) {
-          const double before =
-              (nodes[static_cast<std::size_t>(behind)].px - nodes[static_cast<std::size_t>(further)].px).norm();
-          step *= std::clamp(step.norm() / std::max(1e-9, before), 0.75, 1.33);
-        }
-      } else {
-        for (const int side : {1, -1}) {
-          const int beside = field.at(from.place.i + side * dj, from.place.j + side * di);
-          const int ahead = field.at(i + side * dj, j + side * di);
-          if (beside < 0 || ahead < 0) continue;
-          step = nodes[static_cast<std::size_t>(ahead)].px - nodes[static_cast<std::size_t>(beside)].px;
-          break;
-        }
-      }
-      const auto found = best_near(index, from.px + step, how.tolerance * step.norm(), used, how.strengths);
-      if (!found || !how.fits(from.place.point, *found)) continue;
-      Node next{{i, j, *found}, index.points()[*found], from.step};
-      next.step[axis] = sign * (next.px - from.px);
-      used[*found] = true;
-      field.set(i, j, static_cast<int>(nodes.size()));
-      nodes.push_back(next);
+      const LatticePoint from = nodes_[n];  // a copy: the list grows
+      const int i = from.i + di, j = from.j + dj;
+      if (!is_in_field(i, j) || node_at(i, j) >= 0) continue;
+      const Eigen::Vector2d step = step_from(n, di, dj);
+      const Eigen::Vector2d& from_px = index_.points()[from.point];
+      const auto found = best_near(from_px + step, how.tolerance * step.norm(), how.strengths);
+      if (!found || !how.fits(from.point, *found)) continue;
+      Steps steps = steps_[n];
+      steps[di != 0 ? 0 : 1] = (di + dj) * (index_.points()[*found] - from_px);
+      add({i, j, *found}, steps);
     }
   }
-  std::vector<LatticePoint> grown;
-  grown.reserve(nodes.size());
-  for (const Node& node : nodes) grown.push_back(node.place);
-  return grown;
+  return nodes_;
 }
 
 std::vector<LatticeMatch> match_lattice(std::span<const LatticePoint> grown, std::span<const LatticePlace> places,
                                         int quarter_turns, std::size_t missing_max) {
   std::vector<LatticeMatch> matches;
   // Too small, or so large that it goes on beyond the edge wherever the places lie in it.
-  if (grown.size() + missing_max < places.size() || grown.size() > places.size() + (places.size() + 3) / 4) {
+  if (grown.size() + missing_max < places.size() || grown.size() > lattice_size_max(places.size())) {
     return matches;
   }
   std::vector<LatticePlace> taken;

@@ -1,6 +1,7 @@
-/// A cheap count of points that look like the corners of a checkerboard.
+/// Points that look like the inner corners of a checkerboard.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "platform/core/image_view.hpp"
@@ -14,24 +15,20 @@ struct SaddlePoint {
   float xx = 0, yy = 0, xy = 0;
 };
 
-/// What a picture holds of them.
-struct SaddlePoints {
-  int count = 0;
-  /// Pixels between the 2nd and 98th percentile of their columns and rows: where a board stands if it stands alone.
-  int left = 0, top = 0, right = 0, bottom = 0;
-  std::vector<SaddlePoint> points;  ///< row by row
-};
+using SaddlePoints = std::vector<SaddlePoint>;
 
-/// Local saddle points of the smoothed grey values with black and white alternating four times around them. Every inner
-/// corner of a board is one; plain walls, edges and most clutter have few. Looks at full and at half size and returns
-/// the more numerous. About 1 ms for 640x480.
-[[nodiscard]] SaddlePoints find_saddle_points(GrayImage image);
+/// Local saddle points of the smoothed grey values with black and white alternating four times around them, row by row.
+/// Every inner corner of a board is one; plain walls, edges and most clutter have few. A picture with more than
+/// `count_max` is not looked at any further: the answer is `count_max` + 1 of them. 0.4 ms for 640x480.
+[[nodiscard]] SaddlePoints find_saddle_points(GrayImage image,
+                                              std::size_t count_max = std::numeric_limits<std::size_t>::max());
 
-/// The same at one size: the picture's own, or half of it, which blur and noise harm less; pixels of the full picture.
-[[nodiscard]] SaddlePoints find_saddle_points_full(GrayImage image);
-[[nodiscard]] SaddlePoints find_saddle_points_halved(GrayImage image);
+/// The same in half the size, which blur and noise harm less; pixels of the full picture.
+[[nodiscard]] SaddlePoints find_saddle_points_halved(GrayImage image, std::size_t count_max);
 
 /// How many a picture must have to be searched for a board: a few may be lost in blur or glare.
-[[nodiscard]] constexpr int saddle_points_min(int board_corners) { return board_corners / 2; }
+[[nodiscard]] constexpr std::size_t saddle_points_min(int board_corners) {
+  return static_cast<std::size_t>(board_corners / 2);
+}
 
 }  // namespace firstlook
