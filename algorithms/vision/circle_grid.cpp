@@ -27,7 +27,7 @@ struct Disc {
 constexpr double kAreaMin_px2 = 20;  ///< within the outline of a disc
 
 /// A dark ellipse from its outline; empty when that is none.
-std::optional<Disc> disc_of(const Outline& outline) {
+std::optional<Disc> disc_of(Outline outline) {
   constexpr double kElongationMax = 3.2, kAreaOfEllipseMin = 0.85, kAreaOfEllipseMax = 1.15;
   static_assert(sizeof(Pixel) == sizeof(cv::Point));
   const cv::Mat contour(static_cast<int>(outline.size()), 1, CV_32SC2, const_cast<Pixel*>(outline.data()));
@@ -49,14 +49,14 @@ bool is_same(const Disc& a, const Disc& b) {
   return large_px < 2 * small_px && (a.center - b.center).norm() < small_px / 2;
 }
 
-void add_discs(const cv::Mat& image, int window_px, std::vector<Disc>& discs) {
+void add_discs(DarkOutlines& outlines, int window_px, std::vector<Disc>& discs) {
   // The outline runs through the outermost pixels' centres.
   const auto may_be = [](int width, int height) { return (width - 1) * (height - 1) >= kAreaMin_px2; };
-  for (const Outline& outline : dark_outlines({image.data, image.cols, image.rows}, window_px, may_be)) {
+  outlines.for_each(window_px, may_be, [&](Outline outline) {
     const auto disc = disc_of(outline);
     const auto same = [&](const Disc& d) { return is_same(d, *disc); };
     if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);
-  }
+  });
 }
 
 /// Centre of the darkness in a window around the disc: each pixel counts with the part of it that ink covers.
@@ -228,11 +228,12 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
   const cv::Mat header(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data));
   cv::Mat smooth;  // noise that is as deep as the threshold would fray the discs
   cv::GaussianBlur(header, smooth, cv::Size(3, 3), 0);
+  DarkOutlines outlines({smooth.data, smooth.cols, smooth.rows});
   constexpr std::array<int, 2> kWindows_px = {31, 91};
   std::vector<std::size_t> grid;
   std::vector<Disc> discs;
   for (const int window : kWindows_px) {
-    add_discs(smooth, window, discs);
+    add_discs(outlines, window, discs);
     grid = find_grid(discs, board);
     if (!grid.empty()) break;
   }

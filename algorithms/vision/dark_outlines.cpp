@@ -1,173 +1,177 @@
-/// The adapter to OpenCV's filters: its types end here. Areas and their outlines are ours.
+/// The adapter to OpenCV's box filter: its types end here. Areas and their outlines are ours.
 #include "algorithms/vision/dark_outlines.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cstdint>
+#include <bit>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
-#include <optional>
+#include <utility>
 
 namespace firstlook {
 namespace {
 
-/// Dark pixels side by side in a row, from `begin` to before `end`. An area is known by the first of its runs.
-struct Run {
-  int row = 0, begin = 0, end = 0;
-  std::uint32_t area = 0;  ///< index of a run of the same area, never behind this one
-};
+/// Counterclockwise in the picture, from the right.
+constexpr std::array<Pixel, 8> kNeighbours = {
+    {{1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
+constexpr std::size_t kLeft = 4;
 
-/// The areas of a binary image, told apart by runs.
-class Areas {
- public:
-  /// `dark` is 0 or 255.
-  explicit Areas(const cv::Mat& dark) {
-    std::size_t above = 0;  // the first run of the row above
-    for (int row = 0; row < dark.rows; ++row) {
-      const std::size_t here = runs_.size();
-      add_runs(dark, row);
-      join(above, here);
-      above = here;
-    }
-  }
-
-  /// Calls `f(first pixel, size of the bounding box)` for each area, in the order of the first pixels.
-  template <typename F>
-  void for_each(F&& f) {
-    std::vector<cv::Rect> boxes(runs_.size());
-    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-      const Run& run = runs_[i];
-      boxes[first_of(i)] |= cv::Rect(run.begin, run.row, run.end - run.begin, 1);
-    }
-    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-      if (runs_[i].area == i) f(Pixel{runs_[i].begin, runs_[i].row}, boxes[i].size());
-    }
-  }
-
- private:
-  void add_runs(const cv::Mat& dark, int row) {
-    const auto* const begin = dark.ptr<std::uint8_t>(row);
-    const auto* const end = begin + dark.cols;
-    for (const std::uint8_t* at = begin; at < end;) {
-      const auto* const first =
-          static_cast<const std::uint8_t*>(std::memchr(at, 255, static_cast<std::size_t>(end - at)));
-      if (first == nullptr) return;
-      const auto* const light =
-          static_cast<const std::uint8_t*>(std::memchr(first, 0, static_cast<std::size_t>(end - first)));
-      at = light == nullptr ? end : light;
-      runs_.push_back({row, static_cast<int>(first - begin), static_cast<int>(at - begin),
-                       static_cast<std::uint32_t>(runs_.size())});
-    }
-  }
-
-  /// Runs that touch, also by a corner, of the row [above, here) and of the row [here, end).
-  void join(std::size_t above, std::size_t here) {
-    if (above == here || runs_[above].row + 1 != runs_.back().row) return;
-    for (std::size_t a = above, b = here; a < here && b < runs_.size();) {
-      if (runs_[a].begin <= runs_[b].end && runs_[b].begin <= runs_[a].end) {
-        unite(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
-      }
-      if (runs_[a].end < runs_[b].end) {
-        ++a;
-      } else {
-        ++b;
-      }
-    }
-  }
-
-  std::uint32_t first_of(std::uint32_t run) {
-    while (runs_[run].area != run) run = runs_[run].area = runs_[runs_[run].area].area;
-    return run;
-  }
-
-  void unite(std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t first_a = first_of(a), first_b = first_of(b);
-    runs_[std::max(first_a, first_b)].area = std::min(first_a, first_b);
-  }
-
-  std::vector<Run> runs_;
-};
-
-/// Follows outlines in a binary image that has a border of light pixels.
-class OutlineFollower {
- public:
-  explicit OutlineFollower(const cv::Mat& bordered) : image_(bordered) {
-    for (std::size_t i = 0; i < kNeighbours.size(); ++i) {
-      steps_[i] = kNeighbours[i].y * static_cast<std::ptrdiff_t>(image_.step) + kNeighbours[i].x;
-    }
-  }
-
-  /// From the first pixel of an area (the leftmost of its highest) once around it; empty when that takes more than
-  /// `length_max` pixels.
-  [[nodiscard]] std::optional<Outline> follow(Pixel first, std::size_t length_max) const {
-    const std::uint8_t* const start = image_.ptr<std::uint8_t>(first.y) + first.x;
-    Outline outline;
-    std::size_t to = kLeft;
-    do {
-      to = (to - 1) % kNeighbours.size();
-    } while (start[steps_[to]] == 0 && to != kLeft);
-    if (to == kLeft) return Outline{first};               // a single pixel
-    const std::uint8_t* const last = start + steps_[to];  // from where the outline comes back
-    const std::uint8_t* here = start;
-    for (Pixel at = first;;) {
-      if (outline.size() == length_max) return std::nullopt;
-      outline.push_back(at);
-      do {
-        to = (to + 1) % kNeighbours.size();
-      } while (here[steps_[to]] == 0);
-      const std::uint8_t* const next = here + steps_[to];
-      if (next == start && here == last) return outline;
-      at = {at.x + kNeighbours[to].x, at.y + kNeighbours[to].y};
-      here = next;
-      to = (to + kNeighbours.size() / 2) % kNeighbours.size();  // seen from there, where it came from
-    }
-  }
-
- private:
-  /// Counterclockwise in the picture, from the right.
-  static constexpr std::size_t kLeft = 4;
-  static constexpr std::array<Pixel, 8> kNeighbours = {
-      {{1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
-  const cv::Mat& image_;
-  std::array<std::ptrdiff_t, 8> steps_{};
-};
-
-}  // namespace
-
-namespace {
-
-/// cv::adaptiveThreshold with ADAPTIVE_THRESH_MEAN_C and THRESH_BINARY_INV, without its table: 255 where a pixel is at
-/// least so much darker than the mean of its window.
-cv::Mat darker_than_around(const cv::Mat& image, int window_px, int grays) {
-  cv::Mat mean, dark;
-  cv::boxFilter(image, mean, CV_8U, cv::Size(window_px, window_px), cv::Point(-1, -1), true,
-                cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
-  cv::subtract(mean, image, mean);  // 0 where the pixel is lighter
-  cv::compare(mean, grays, dark, cv::CMP_GE);
-  return dark;
+/// Bit of a pixel's surroundings (see `surroundings`) that is set when a neighbour is dark.
+constexpr std::size_t bit_of(const Pixel& neighbour) {
+  return static_cast<std::size_t>(3 * (neighbour.x + 1) + neighbour.y + 1);
 }
 
+/// The 3x3 pixels around one as a number of nine bits, column by column.
+std::size_t surroundings(const std::uint8_t* pixel, std::ptrdiff_t stride) {
+  // The middle row's word begins with the pixel on the left; one byte of it is not looked at.
+  std::uint32_t rows[3];
+  for (std::ptrdiff_t v = 0; v < 3; ++v) std::memcpy(&rows[v], pixel + (v - 1) * stride - 1, sizeof rows[v]);
+  constexpr std::uint32_t kOneOfEach = 0x010101;
+  const std::uint32_t bits = (rows[0] & kOneOfEach) | (rows[1] & kOneOfEach) << 1U | (rows[2] & kOneOfEach) << 2U;
+  return (bits & 0x7U) | (bits >> 5U & 0x38U) | (bits >> 10U & 0x1C0U);
+}
+
+/// For each direction and surroundings: the next direction counterclockwise that leads to a dark pixel.
+constexpr auto kTurns = [] {
+  std::array<std::array<std::uint8_t, 512>, 8> turns{};
+  for (std::size_t from = 0; from < 8; ++from) {
+    for (std::size_t around = 0; around < 512; ++around) {
+      std::size_t to = (from + 1) % 8;
+      while (to != from && (around >> bit_of(kNeighbours[to]) & 1U) == 0) to = (to + 1) % 8;
+      turns[from][around] = static_cast<std::uint8_t>(to);
+    }
+  }
+  return turns;
+}();
+
 }  // namespace
 
-std::vector<Outline> dark_outlines(GrayImage image, int window_px,
-                                   const std::function<bool(int width, int height)>& may_be) {
+DarkOutlines::DarkOutlines(GrayImage image)
+    : image_(image),
+      stride_(image.width + 4),  // light pixels on both sides, and what `surroundings` reads beyond them
+      mean_(image.size()),
+      dark_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(image.height + 2)) {}
+
+/// As cv::adaptiveThreshold with ADAPTIVE_THRESH_MEAN_C and THRESH_BINARY_INV.
+void DarkOutlines::mark_dark(int row) {
   constexpr int kDarker = 7;  // grey levels below the mean of the window
+  const int width = image_.width;
+  const std::uint8_t* const pixels = &image_.at(0, row);
+  const std::uint8_t* const mean = mean_.data() + static_cast<std::ptrdiff_t>(row) * width;
+  std::uint8_t* const dark = dark_row(row);
+  for (int u = 0; u < width; ++u) dark[u] = mean[u] - pixels[u] >= kDarker ? 255 : 0;
+}
+
+void DarkOutlines::find_runs(int row) {
+  // Eight pixels at a time where nothing changes; the last ones look at the border, where the last run ends.
+  constexpr int kStep = 8;
+  constexpr std::uint64_t kOneOfEach = 0x8080808080808080;
+  const std::uint8_t* const dark = dark_row(row);
+  edges_.clear();
+  int u = 0;
+  for (; u + kStep <= image_.width; u += kStep) {
+    std::uint64_t before = 0, here = 0;
+    std::memcpy(&before, dark + u - 1, sizeof before);
+    std::memcpy(&here, dark + u, sizeof here);
+    for (std::uint64_t changes = (before ^ here) & kOneOfEach; changes != 0; changes &= changes - 1) {
+      edges_.push_back(u + std::countr_zero(changes) / 8);
+    }
+  }
+  for (; u <= image_.width; ++u) {
+    if (dark[u] != dark[u - 1]) edges_.push_back(u);
+  }
+}
+
+std::uint32_t DarkOutlines::whole_of(std::uint32_t area) {
+  while (areas_[area].part_of != area) area = areas_[area].part_of = areas_[areas_[area].part_of].part_of;
+  return area;
+}
+
+std::uint32_t DarkOutlines::unite(std::uint32_t a, std::uint32_t b) {
+  if (a == b) return a;
+  Area& whole = areas_[std::min(a, b)];
+  Area& part = areas_[std::max(a, b)];
+  part.part_of = std::min(a, b);
+  whole.left = std::min(whole.left, part.left);
+  whole.right = std::max(whole.right, part.right);
+  whole.bottom = std::max(whole.bottom, part.bottom);
+  return part.part_of;
+}
+
+/// Makes runs of the edges, which go on with the areas of those above that they touch, also by a corner.
+void DarkOutlines::join_runs(int row) {
+  std::swap(above_, here_);
+  here_.clear();
+  auto above = above_.cbegin();
+  for (std::size_t i = 0; i + 1 < edges_.size(); i += 2) {
+    Run run{edges_[i], edges_[i + 1], static_cast<std::uint32_t>(areas_.size())};
+    while (above != above_.cend() && above->end < run.begin) ++above;
+    if (above == above_.cend() || above->begin > run.end) {
+      areas_.push_back({run.area, {run.begin, row}, run.begin, run.end, row});
+    } else {
+      run.area = whole_of(above->area);
+      // The last one above may touch the next run, too.
+      while (above + 1 != above_.cend() && (above + 1)->begin <= run.end) {
+        ++above;
+        run.area = unite(run.area, whole_of(above->area));
+      }
+      Area& area = areas_[run.area];
+      area.left = std::min(area.left, run.begin);
+      area.right = std::max(area.right, run.end);
+      area.bottom = row;
+    }
+    here_.push_back(run);
+  }
+}
+
+/// From the first pixel of an area once around it; empty when that takes more than `length_max` pixels.
+Outline DarkOutlines::follow(Pixel first, std::size_t length_max) {
+  if (outline_.size() < length_max) outline_.resize(length_max);
+  std::array<std::ptrdiff_t, 8> steps{};
+  for (std::size_t i = 0; i < 8; ++i) steps[i] = kNeighbours[i].y * stride_ + kNeighbours[i].x;
+  const std::uint8_t* const start = dark_row(first.y) + first.x;
+  outline_[0] = first;
+  std::size_t to = kLeft;
+  do {
+    to = (to - 1) % kNeighbours.size();
+  } while (start[steps[to]] == 0 && to != kLeft);
+  if (to == kLeft) return Outline(outline_).first(1);   // a single pixel
+  const std::uint8_t* const last = start + steps[to];  // from where the outline comes back
+  const std::uint8_t* here = start;
+  Pixel at = first;
+  for (std::size_t length = 0; length < length_max;) {
+    outline_[length++] = at;
+    to = kTurns[to][surroundings(here, stride_)];
+    const std::uint8_t* const next = here + steps[to];
+    if (next == start && here == last) return Outline(outline_).first(length);
+    at = {at.x + kNeighbours[to].x, at.y + kNeighbours[to].y};
+    here = next;
+    to = (to + kNeighbours.size() / 2) % kNeighbours.size();  // seen from there, where it came from
+  }
+  return {};
+}
+
+void DarkOutlines::for_each(int window_px, FunctionRef<bool(int width, int height)> may_be,
+                            FunctionRef<void(Outline)> visit) {
   // OpenCV has no read-only header for foreign pixels; nothing writes to it.
-  const cv::Mat pixels(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data));
-  cv::Mat bordered;
-  cv::copyMakeBorder(darker_than_around(pixels, window_px, kDarker), bordered, 1, 1, 1, 1, cv::BORDER_CONSTANT,
-                     cv::Scalar(0));
-  Areas areas(bordered);
-  const OutlineFollower follower(bordered);
-  std::vector<Outline> outlines;
-  areas.for_each([&](Pixel first, cv::Size box) {
-    if (!may_be(box.width, box.height)) return;
-    auto outline = follower.follow(first, static_cast<std::size_t>(4 * (box.width + box.height)));
-    if (!outline) return;
-    for (Pixel& p : *outline) p = {p.x - 1, p.y - 1};
-    outlines.push_back(std::move(*outline));
-  });
-  return outlines;
+  const cv::Mat pixels(image_.height, image_.width, CV_8UC1, const_cast<std::uint8_t*>(image_.data));
+  cv::Mat mean(image_.height, image_.width, CV_8UC1, mean_.data());
+  cv::boxFilter(pixels, mean, CV_8U, cv::Size(window_px, window_px), cv::Point(-1, -1), true,
+                cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  areas_.clear();
+  here_.clear();
+  for (int row = 0; row < image_.height; ++row) {
+    mark_dark(row);
+    find_runs(row);
+    join_runs(row);
+  }
+  for (std::uint32_t i = 0; i < areas_.size(); ++i) {
+    const Area& area = areas_[i];
+    const int width = area.right - area.left, height = area.bottom - area.first.y + 1;
+    if (area.part_of != i || !may_be(width, height)) continue;
+    const Outline outline = follow(area.first, static_cast<std::size_t>(4 * (width + height)));
+    if (!outline.empty()) visit(outline);
+  }
 }
 
 }  // namespace firstlook

@@ -12,6 +12,8 @@
 #include <span>
 
 #include "algorithms/vision/dark_outlines.hpp"
+#include "platform/core/fixed_vector.hpp"
+#include "platform/core/processor.hpp"
 
 namespace firstlook {
 namespace {
@@ -36,13 +38,13 @@ bool is_same(const Quad& a, const Quad& b, double near_px) {
 }
 
 /// The outline as OpenCV reads one, without a copy.
-cv::Mat as_points(const Outline& outline) {
+cv::Mat as_points(Outline outline) {
   static_assert(sizeof(Pixel) == sizeof(cv::Point));
   return {static_cast<int>(outline.size()), 1, CV_32SC2, const_cast<Pixel*>(outline.data())};
 }
 
 /// The outline as a convex quadrangle, clockwise; empty when it is none.
-std::optional<Quad> quad_of(const Outline& outline, double side_min_px) {
+std::optional<Quad> quad_of(Outline outline, double side_min_px) {
   if (static_cast<double>(outline.size()) < 4 * side_min_px) return std::nullopt;
   const cv::Mat contour = as_points(outline);
   // A tenth of a side: bent or frayed sides stay one side.
@@ -57,17 +59,17 @@ std::optional<Quad> quad_of(const Outline& outline, double side_min_px) {
   return quad;
 }
 
-void add_quads(const cv::Mat& image, int window_px, double side_min_px, std::vector<Quad>& quads) {
+void add_quads(DarkOutlines& outlines, int window_px, double side_min_px, std::vector<Quad>& quads) {
   // No side is longer than the diagonal of the box.
   const auto may_be = [&](int width, int height) { return std::hypot(width - 1, height - 1) >= side_min_px; };
-  for (const Outline& outline : dark_outlines({image.data, image.cols, image.rows}, window_px, may_be)) {
+  outlines.for_each(window_px, may_be, [&](Outline outline) {
     const auto quad = quad_of(outline, side_min_px);
-    if (!quad) continue;
+    if (!quad) return;
     const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
     if (std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q, near_px); })) {
       quads.push_back(*quad);
     }
-  }
+  });
 }
 
 std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
@@ -80,9 +82,10 @@ std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
   cv::Mat smooth;
   cv::GaussianBlur(searched, smooth, cv::Size(3, 3), 0);
   searched = smooth;
+  DarkOutlines outlines({searched.data, searched.cols, searched.rows});
   std::vector<Quad> quads;
   for (const int window : kWindows_px) {
-    add_quads(searched, window, half ? side_min_px / 2 : side_min_px, quads);
+    add_quads(outlines, window, half ? side_min_px / 2 : side_min_px, quads);
   }
   if (!half) return quads;
   for (Quad& quad : quads) {
@@ -102,60 +105,100 @@ struct Side {
   [[nodiscard]] Eigen::Vector2d tangent(double t) const { return along + (f[1] + 2 * t * f[2]) * outward; }
 };
 
-/// gray_between of a point at least at the first and before the last pixel's centre.
-double gray_inside(GrayImage image, const Eigen::Vector2d& px) {
-  const int u0 = static_cast<int>(px.x()), v0 = static_cast<int>(px.y());
-  const double a = px.x() - u0, b = px.y() - v0;
-  const std::uint8_t* top = &image.at(u0, v0);
-  const std::uint8_t* low = top + image.width;
-  return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * low[0] + a * low[1]);
-}
-
-bool is_inside(GrayImage image, const Eigen::Vector2d& px) {
-  return px.x() >= 0 && px.y() >= 0 && px.x() < image.width - 1 && px.y() < image.height - 1;
-}
+/// Left out at both ends of a side, where the other side's edge is near.
+double skipped_px(double length_px) { return std::max(1.5, 0.08 * length_px); }
 
 struct EdgePoint {
   double t = 0, offset = 0;
   double rise = 0;  ///< grey levels from dark to white
 };
 
-constexpr double kEdgeStep_px = 0.5;
+constexpr std::size_t kSidePointsMax = 60;
+using EdgePoints = FixedVector<EdgePoint, kSidePointsMax>;
+using Lanes = std::array<double, kSidePointsMax>;  ///< a number for each point of a side
+
+/// Lines across a side, sampled from `u`, `v` on in steps that are the same for all.
+struct Crossings {
+  std::size_t count = 0;
+  Lanes t, from_px;  ///< along the side, and of the first sample from the straight line
+  Lanes u, v;        ///< the first sample, pixels
+  double step_u = 0, step_v = 0;
+  int steps = 0;
+};
 
 /// Sums over the rises of the grey value from sample to sample.
 struct Rises {
-  double sum = 0;     ///< grey levels
-  double moment = 0;  ///< times the steps from the first sample to the middle of each rise
+  Lanes sum;     ///< grey levels
+  Lanes moment;  ///< times the steps from the first sample to the middle of each rise
 };
 
-template <typename Gray>
-Rises sum_rises(const Eigen::Vector2d& first, const Eigen::Vector2d& step, int steps, Gray gray) {
-  Rises rises;
-  double before = gray(first);
-  for (int i = 1; i <= steps; ++i) {
-    const double here = gray(first + i * step);
-    const double rise = std::max(0.0, here - before);
-    rises.sum += rise;
-    rises.moment += rise * (i - 0.5);
-    before = here;
+/// gray_between at sample `i` of each line.
+inline void sample_grays(GrayImage image, const Crossings& c, int i, Lanes& gray) {
+  const int width = image.width, height = image.height;
+  const double u_max = width - 1.0, v_max = height - 1.0, du = i * c.step_u, dv = i * c.step_v;
+  Lanes right, down, top_left, top_right, low_left, low_right;
+  std::array<int, kSidePointsMax> at;
+  for (std::size_t k = 0; k < c.count; ++k) {
+    const double u = std::min(std::max(c.u[k] + du, 0.0), u_max), v = std::min(std::max(c.v[k] + dv, 0.0), v_max);
+    const int u0 = std::min(static_cast<int>(u), width - 2), v0 = std::min(static_cast<int>(v), height - 2);
+    right[k] = u - u0, down[k] = v - v0;
+    at[k] = v0 * width + u0;
   }
-  return rises;
+  for (std::size_t k = 0; k < c.count; ++k) {
+    const std::uint8_t* const top = image.data + at[k];
+    const std::uint8_t* const low = top + width;
+    top_left[k] = top[0], top_right[k] = top[1], low_left[k] = low[0], low_right[k] = low[1];
+  }
+  for (std::size_t k = 0; k < c.count; ++k) {
+    const double a = right[k], b = down[k];
+    gray[k] = (1 - b) * ((1 - a) * top_left[k] + a * top_right[k]) + b * ((1 - a) * low_left[k] + a * low_right[k]);
+  }
 }
 
-/// Where the grey values rise across the side at t, within `reach_px` of its present curve: the centre of the rises.
+inline void sum_rises(GrayImage image, const Crossings& c, Rises& rises) {
+  std::array<Lanes, 2> grays;
+  sample_grays(image, c, 0, grays[0]);
+  for (std::size_t k = 0; k < c.count; ++k) rises.sum[k] = rises.moment[k] = 0;
+  for (int i = 1; i <= c.steps; ++i) {
+    const Lanes& before = grays[static_cast<std::size_t>(i + 1) % 2];
+    Lanes& here = grays[static_cast<std::size_t>(i) % 2];
+    sample_grays(image, c, i, here);
+    for (std::size_t k = 0; k < c.count; ++k) {
+      const double rise = std::max(0.0, here[k] - before[k]);
+      rises.sum[k] += rise;
+      rises.moment[k] += rise * (i - 0.5);
+    }
+  }
+}
+// The same instructions in the same order, several lines at a time where the processor can: the same bits.
+FIRSTLOOK_AVX2 void sum_rises_avx2(GrayImage image, const Crossings& c, Rises& rises) { sum_rises(image, c, rises); }
+void sum_rises_portable(GrayImage image, const Crossings& c, Rises& rises) { sum_rises(image, c, rises); }
+
+/// Where the grey values rise across the side, within `reach_px` of its present curve: the centres of the rises.
 /// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
-std::optional<EdgePoint> edge_point(GrayImage image, const Side& side, double t, double reach_px) {
+EdgePoints edge_points(GrayImage image, const Side& side, double length_px, double reach_px, int count) {
+  constexpr double kStep_px = 0.5;
   constexpr double kRiseMin = 8;  // grey levels, all rises together
-  const int steps = static_cast<int>(std::lround(2 * reach_px / kEdgeStep_px));
-  const double from_px = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
-  const Eigen::Vector2d first = side.start + t * side.along + from_px * side.outward;
-  const Eigen::Vector2d step = kEdgeStep_px * side.outward;
-  // All samples lie between the ends: the border needs no thought where these are inside.
-  const bool inside = is_inside(image, first) && is_inside(image, first + steps * step);
-  const Rises rises = inside ? sum_rises(first, step, steps, [image](const auto& p) { return gray_inside(image, p); })
-                             : sum_rises(first, step, steps, [image](const auto& p) { return gray_between(image, p); });
-  if (rises.sum < kRiseMin) return std::nullopt;
-  return EdgePoint{t, from_px + kEdgeStep_px * rises.moment / rises.sum, rises.sum};
+  const double skipped = skipped_px(length_px);
+  Crossings c;
+  c.count = static_cast<std::size_t>(count);
+  c.steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
+  c.step_u = kStep_px * side.outward.x(), c.step_v = kStep_px * side.outward.y();
+  for (std::size_t k = 0; k < c.count; ++k) {
+    const double t = skipped + (length_px - 2 * skipped) * (static_cast<double>(k) + 0.5) / count;
+    c.t[k] = t;
+    c.from_px[k] = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
+    const Eigen::Vector2d first = side.start + t * side.along + c.from_px[k] * side.outward;
+    c.u[k] = first.x(), c.v[k] = first.y();
+  }
+  Rises rises;
+  has_avx2() ? sum_rises_avx2(image, c, rises) : sum_rises_portable(image, c, rises);
+  EdgePoints points;
+  for (std::size_t k = 0; k < c.count; ++k) {
+    if (rises.sum[k] < kRiseMin) continue;
+    points.push_back({c.t[k], c.from_px[k] + kStep_px * rises.moment[k] / rises.sum[k], rises.sum[k]});
+  }
+  return points;
 }
 
 /// Least squares of degree 1 or 2, with the sum of squared residuals.
@@ -165,7 +208,7 @@ struct CurveFit {
   double bend_sigma = 0;  ///< of f2 for an offset sigma of 1
 };
 
-CurveFit fit_curve(const std::vector<EdgePoint>& points, bool bent) {
+CurveFit fit_curve(const EdgePoints& points, bool bent) {
   std::array<double, 5> powers{};  // sums of t^k
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const EdgePoint& p : points) {
@@ -191,9 +234,9 @@ CurveFit fit_curve(const std::vector<EdgePoint>& points, bool bent) {
 }
 
 /// Leaves out the points that lie farther than three sigmas off the curve.
-std::vector<EdgePoint> without_outliers(const std::vector<EdgePoint>& points, const CurveFit& fit) {
+EdgePoints without_outliers(const EdgePoints& points, const CurveFit& fit) {
   const double sigma = std::max(0.05, std::sqrt(fit.squared / static_cast<double>(points.size())));
-  std::vector<EdgePoint> kept;
+  EdgePoints kept;
   for (const EdgePoint& p : points) {
     if (std::abs(p.offset - (fit.f[0] + p.t * (fit.f[1] + p.t * fit.f[2]))) <= 3 * sigma) kept.push_back(p);
   }
@@ -203,13 +246,8 @@ std::vector<EdgePoint> without_outliers(const std::vector<EdgePoint>& points, co
 /// The mean rise of the side's edge, grey levels; empty when there is none.
 std::optional<double> refine_side(GrayImage image, double length_px, double reach_px, int points_max, Side& side) {
   constexpr int kPointsMin = 6, kPointsForBend = 16;
-  const double skipped = std::max(1.5, 0.08 * length_px);  // at the ends, where the other side's edge is near
-  const int count = std::clamp(static_cast<int>(length_px - 2 * skipped), kPointsMin, points_max);
-  std::vector<EdgePoint> points;
-  for (int i = 0; i < count; ++i) {
-    const double t = skipped + (length_px - 2 * skipped) * (i + 0.5) / count;
-    if (const auto point = edge_point(image, side, t, reach_px)) points.push_back(*point);
-  }
+  const int count = std::clamp(static_cast<int>(length_px - 2 * skipped_px(length_px)), kPointsMin, points_max);
+  EdgePoints points = edge_points(image, side, length_px, reach_px, count);
   if (static_cast<int>(points.size()) * 2 < std::max(count, 2 * kPointsMin - 2)) return std::nullopt;
   double rise = 0;
   for (const EdgePoint& p : points) rise += p.rise / static_cast<double>(points.size());
@@ -271,7 +309,7 @@ bool refine_quad(GrayImage image, double cell_px, QuadFit fit, Quad& quad) {
   };
   // Wide first, since contours are a pixel off; then narrow around what was found, the last time with all points. Only
   // rises from dark to white count, so the border's inner edge does no harm.
-  constexpr std::array<Round, 3> kRounds = {{{3.0, 16}, {2.0, 16}, {1.5, 60}}};
+  constexpr std::array<Round, 3> kRounds = {{{3.0, 16}, {2.0, 16}, {1.5, kSidePointsMax}}};
   std::array<Side, 4> sides;
   for (const Round& round : std::span(kRounds).first(fit == QuadFit::kToRead ? 1 : kRounds.size())) {
     const double reach_px = std::clamp(0.9 * cell_px, 1.5, round.widest_px);

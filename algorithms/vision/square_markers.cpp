@@ -118,6 +118,7 @@ class CodeBook {
     if (const auto found = exact_.find(code); found != exact_.end()) {
       return found->second.marker >= 0 ? std::optional(found->second) : std::nullopt;
     }
+    if (family_.correctable == 0) return std::nullopt;
     Reading best{-1, 0, family_.correctable + 1};
     bool alone = false;
     for (std::size_t m = 0; m < codes_.size(); ++m) {

@@ -9,7 +9,7 @@
 namespace firstlook {
 namespace {
 
-using Outlines = std::vector<Outline>;
+using Outlines = std::vector<std::vector<Pixel>>;
 
 GrayImage view(const cv::Mat& image) { return {image.data, image.cols, image.rows}; }
 
@@ -31,7 +31,14 @@ Outlines by_opencv(const cv::Mat& image, int window_px) {
   return outer;
 }
 
-cv::Rect box_of(const Outline& outline) {
+template <typename F>
+Outlines collect(DarkOutlines& search, int window_px, const F& may_be) {
+  Outlines outlines;
+  search.for_each(window_px, may_be, [&](Outline o) { outlines.emplace_back(o.begin(), o.end()); });
+  return outlines;
+}
+
+cv::Rect box_of(Outline outline) {
   cv::Rect box;
   for (const Pixel& p : outline) box |= cv::Rect(p.x, p.y, 1, 1);
   return box;
@@ -73,8 +80,11 @@ TEST_CASE("outlines of dark areas are those of OpenCV's contours") {
     const int window_px = 11 + 2 * random.below(20), least = random.below(12);
     const auto may_be = [least](int w, int h) { return w * h >= least; };
     const Outlines all = by_opencv(image, window_px), expected = wanted(all, may_be);
-    const Outlines found = dark_outlines(view(image), window_px, may_be);
+    DarkOutlines search(view(image));
+    const Outlines found = collect(search, window_px, may_be);
     REQUIRE(found == expected);
+    // Nothing is left behind by the window before.
+    REQUIRE(collect(search, 41, may_be) == wanted(by_opencv(image, 41), may_be));
     compared += found.size();
     too_long += wanted(all, [](int, int) { return true; }).size() < all.size() ? 1 : 0;
   }
@@ -85,17 +95,18 @@ TEST_CASE("outlines of dark areas are those of OpenCV's contours") {
 TEST_CASE("outlines at the image's edge, of single pixels, of areas within rings") {
   const auto all = [](int, int) { return true; };
   cv::Mat image(60, 80, CV_8UC1, cv::Scalar(200));
-  CHECK(dark_outlines(view(image), 25, all).empty());
+  DarkOutlines search(view(image));
+  CHECK(collect(search, 25, all).empty());
   image.at<std::uint8_t>(0, 0) = 0;
   image.at<std::uint8_t>(59, 79) = 0;
   cv::circle(image, {40, 30}, 20, cv::Scalar(20), 4);
   cv::rectangle(image, cv::Rect(36, 26, 8, 8), cv::Scalar(20), cv::FILLED);
-  const Outlines found = dark_outlines(view(image), 25, all);
+  const Outlines found = collect(search, 25, all);
   CHECK(found == by_opencv(image, 25));
   REQUIRE(found.size() == 4);
-  CHECK(found[0] == Outline{{0, 0}});
+  CHECK(found[0] == std::vector<Pixel>{{0, 0}});
   CHECK(box_of(found[2]) == cv::Rect(36, 26, 8, 8));
-  CHECK(found[3] == Outline{{79, 59}});
+  CHECK(found[3] == std::vector<Pixel>{{79, 59}});
 }
 
 }  // namespace firstlook
