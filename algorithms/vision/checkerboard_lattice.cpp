@@ -6,9 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "algorithms/vision/gray_sampling.hpp"
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/lattice.hpp"
-#include "algorithms/vision/marker_quads.hpp"
 
 namespace firstlook {
 namespace {

@@ -12,9 +12,9 @@
 #include <optional>
 
 #include "algorithms/vision/dark_outlines.hpp"
+#include "algorithms/vision/gray_sampling.hpp"
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/lattice.hpp"
-#include "algorithms/vision/marker_quads.hpp"
 
 namespace firstlook {
 namespace {

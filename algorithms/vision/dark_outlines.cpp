@@ -49,17 +49,15 @@ constexpr auto kTurns = [] {
 DarkOutlines::DarkOutlines(GrayImage image)
     : image_(image),
       stride_(image.width + 4),  // light pixels on both sides, and what `surroundings` reads beyond them
-      mean_(image.size()),
       dark_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(image.height + 2)) {}
 
-/// As cv::adaptiveThreshold with ADAPTIVE_THRESH_MEAN_C and THRESH_BINARY_INV.
+/// Makes dark pixels of the means, as cv::adaptiveThreshold with ADAPTIVE_THRESH_MEAN_C and THRESH_BINARY_INV.
 void DarkOutlines::mark_dark(int row) {
   constexpr int kDarker = 7;  // grey levels below the mean of the window
   const int width = image_.width;
   const std::uint8_t* const pixels = &image_.at(0, row);
-  const std::uint8_t* const mean = mean_.data() + static_cast<std::ptrdiff_t>(row) * width;
   std::uint8_t* const dark = dark_row(row);
-  for (int u = 0; u < width; ++u) dark[u] = mean[u] - pixels[u] >= kDarker ? 255 : 0;
+  for (int u = 0; u < width; ++u) dark[u] = dark[u] - pixels[u] >= kDarker ? 255 : 0;
 }
 
 void DarkOutlines::find_runs(int row) {
@@ -155,7 +153,7 @@ void DarkOutlines::for_each(int window_px, FunctionRef<bool(int width, int heigh
                             FunctionRef<void(Outline)> visit) {
   // OpenCV has no read-only header for foreign pixels; nothing writes to it.
   const cv::Mat pixels(image_.height, image_.width, CV_8UC1, const_cast<std::uint8_t*>(image_.data));
-  cv::Mat mean(image_.height, image_.width, CV_8UC1, mean_.data());
+  cv::Mat mean(image_.height, image_.width, CV_8UC1, dark_row(0), static_cast<std::size_t>(stride_));
   cv::boxFilter(pixels, mean, CV_8U, cv::Size(window_px, window_px), cv::Point(-1, -1), true,
                 cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
   areas_.clear();

@@ -58,8 +58,8 @@ class DarkOutlines {
 
   GrayImage image_;
   std::ptrdiff_t stride_;
-  std::vector<std::uint8_t> mean_;  ///< of the window around each pixel
-  std::vector<std::uint8_t> dark_;  ///< 255, else 0; with a border of light pixels
+  /// 255, else 0; with a border of light pixels. Before: the means of the windows around each pixel.
+  std::vector<std::uint8_t> dark_;
   std::vector<int> edges_;          ///< where runs of a row begin and end, by turns
   std::vector<Run> above_, here_;   ///< runs of two rows
   std::vector<Area> areas_;

@@ -12,8 +12,8 @@
 #include <span>
 
 #include "algorithms/vision/dark_outlines.hpp"
+#include "algorithms/vision/gray_sampling.hpp"
 #include "platform/core/fixed_vector.hpp"
-#include "platform/core/processor.hpp"
 
 namespace firstlook {
 namespace {
@@ -117,86 +117,41 @@ constexpr std::size_t kSidePointsMax = 60;
 using EdgePoints = FixedVector<EdgePoint, kSidePointsMax>;
 using Lanes = std::array<double, kSidePointsMax>;  ///< a number for each point of a side
 
-/// Lines across a side, sampled from `u`, `v` on in steps that are the same for all.
-struct Crossings {
-  std::size_t count = 0;
-  Lanes t, from_px;  ///< along the side, and of the first sample from the straight line
-  Lanes u, v;        ///< the first sample, pixels
-  double step_u = 0, step_v = 0;
-  int steps = 0;
-};
-
-/// Sums over the rises of the grey value from sample to sample.
-struct Rises {
-  Lanes sum;     ///< grey levels
-  Lanes moment;  ///< times the steps from the first sample to the middle of each rise
-};
-
-/// gray_between at sample `i` of each line.
-inline void sample_grays(GrayImage image, const Crossings& c, int i, Lanes& gray) {
-  const int width = image.width, height = image.height;
-  const double u_max = width - 1.0, v_max = height - 1.0, du = i * c.step_u, dv = i * c.step_v;
-  Lanes right, down, top_left, top_right, low_left, low_right;
-  std::array<int, kSidePointsMax> at;
-  for (std::size_t k = 0; k < c.count; ++k) {
-    const double u = std::min(std::max(c.u[k] + du, 0.0), u_max), v = std::min(std::max(c.v[k] + dv, 0.0), v_max);
-    const int u0 = std::min(static_cast<int>(u), width - 2), v0 = std::min(static_cast<int>(v), height - 2);
-    right[k] = u - u0, down[k] = v - v0;
-    at[k] = v0 * width + u0;
-  }
-  for (std::size_t k = 0; k < c.count; ++k) {
-    const std::uint8_t* const top = image.data + at[k];
-    const std::uint8_t* const low = top + width;
-    top_left[k] = top[0], top_right[k] = top[1], low_left[k] = low[0], low_right[k] = low[1];
-  }
-  for (std::size_t k = 0; k < c.count; ++k) {
-    const double a = right[k], b = down[k];
-    gray[k] = (1 - b) * ((1 - a) * top_left[k] + a * top_right[k]) + b * ((1 - a) * low_left[k] + a * low_right[k]);
-  }
-}
-
-inline void sum_rises(GrayImage image, const Crossings& c, Rises& rises) {
-  std::array<Lanes, 2> grays;
-  sample_grays(image, c, 0, grays[0]);
-  for (std::size_t k = 0; k < c.count; ++k) rises.sum[k] = rises.moment[k] = 0;
-  for (int i = 1; i <= c.steps; ++i) {
-    const Lanes& before = grays[static_cast<std::size_t>(i + 1) % 2];
-    Lanes& here = grays[static_cast<std::size_t>(i) % 2];
-    sample_grays(image, c, i, here);
-    for (std::size_t k = 0; k < c.count; ++k) {
-      const double rise = std::max(0.0, here[k] - before[k]);
-      rises.sum[k] += rise;
-      rises.moment[k] += rise * (i - 0.5);
-    }
-  }
-}
-// The same instructions in the same order, several lines at a time where the processor can: the same bits.
-FIRSTLOOK_AVX2 void sum_rises_avx2(GrayImage image, const Crossings& c, Rises& rises) { sum_rises(image, c, rises); }
-void sum_rises_portable(GrayImage image, const Crossings& c, Rises& rises) { sum_rises(image, c, rises); }
-
-/// Where the grey values rise across the side, within `reach_px` of its present curve: the centres of the rises.
-/// (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a pixel.)
+/// Where the grey values rise across the side, within `reach_px` of its present curve, at `count` places: the centres of
+/// the rises. (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a
+/// pixel.)
 EdgePoints edge_points(GrayImage image, const Side& side, double length_px, double reach_px, int count) {
   constexpr double kStep_px = 0.5;
   constexpr double kRiseMin = 8;  // grey levels, all rises together
   const double skipped = skipped_px(length_px);
-  Crossings c;
-  c.count = static_cast<std::size_t>(count);
-  c.steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
-  c.step_u = kStep_px * side.outward.x(), c.step_v = kStep_px * side.outward.y();
-  for (std::size_t k = 0; k < c.count; ++k) {
+  const auto n = static_cast<std::size_t>(count);
+  Lanes ts, from_px, first_u, first_v;  // along the side; of the first sample, from the straight line and in pixels
+  for (std::size_t k = 0; k < n; ++k) {
     const double t = skipped + (length_px - 2 * skipped) * (static_cast<double>(k) + 0.5) / count;
-    c.t[k] = t;
-    c.from_px[k] = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
-    const Eigen::Vector2d first = side.start + t * side.along + c.from_px[k] * side.outward;
-    c.u[k] = first.x(), c.v[k] = first.y();
+    ts[k] = t;
+    from_px[k] = side.f[0] + t * (side.f[1] + t * side.f[2]) - reach_px;
+    const Eigen::Vector2d first = side.start + t * side.along + from_px[k] * side.outward;
+    first_u[k] = first.x(), first_v[k] = first.y();
   }
-  Rises rises;
-  has_avx2() ? sum_rises_avx2(image, c, rises) : sum_rises_portable(image, c, rises);
+  // Sums over the rises from sample to sample, and of each times the steps to its middle; all places side by side.
+  Lanes rises{}, moments{}, u, v;
+  std::array<Lanes, 2> grays;
+  const int steps = static_cast<int>(std::lround(2 * reach_px / kStep_px));
+  for (int i = 0; i <= steps; ++i) {
+    const Eigen::Vector2d step = i * (kStep_px * side.outward);
+    for (std::size_t k = 0; k < n; ++k) u[k] = first_u[k] + step.x(), v[k] = first_v[k] + step.y();
+    const Lanes& before = grays[static_cast<std::size_t>(i + 1) % 2];
+    Lanes& here = grays[static_cast<std::size_t>(i) % 2];
+    grays_between(image, std::span(u).first(n), std::span(v).first(n), std::span(here).first(n));
+    for (std::size_t k = 0; k < n && i > 0; ++k) {
+      const double rise = std::max(0.0, here[k] - before[k]);
+      rises[k] += rise;
+      moments[k] += rise * (i - 0.5);
+    }
+  }
   EdgePoints points;
-  for (std::size_t k = 0; k < c.count; ++k) {
-    if (rises.sum[k] < kRiseMin) continue;
-    points.push_back({c.t[k], c.from_px[k] + kStep_px * rises.moment[k] / rises.sum[k], rises.sum[k]});
+  for (std::size_t k = 0; k < n; ++k) {
+    if (rises[k] >= kRiseMin) points.push_back({ts[k], from_px[k] + kStep_px * moments[k] / rises[k], rises[k]});
   }
   return points;
 }
@@ -280,15 +235,6 @@ std::optional<Eigen::Vector2d> meeting(const Side& a, const Side& b, const Eigen
 }
 
 }  // namespace
-
-double gray_between(GrayImage image, const Eigen::Vector2d& px) {
-  const double u = std::clamp(px.x(), 0.0, image.width - 1.0), v = std::clamp(px.y(), 0.0, image.height - 1.0);
-  const int u0 = std::min(static_cast<int>(u), image.width - 2), v0 = std::min(static_cast<int>(v), image.height - 2);
-  const double a = u - u0, b = v - v0;
-  const std::uint8_t* top = &image.at(u0, v0);
-  const std::uint8_t* low = top + image.width;
-  return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * low[0] + a * low[1]);
-}
 
 Result<std::vector<Quad>> find_dark_quads(GrayImage image, double side_min_px) {
   try {

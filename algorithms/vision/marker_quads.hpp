@@ -29,7 +29,4 @@ enum class QuadFit : std::uint8_t { kToRead, kToMeasure };
 /// dark to white (seen from inside) lies: the width of a marker's border. False when a side has no edge.
 [[nodiscard]] bool refine_quad(GrayImage image, double cell_px, QuadFit fit, Quad& quad);
 
-/// Grey value between pixel centres, bilinear; the border's beyond the image.
-[[nodiscard]] double gray_between(GrayImage image, const Eigen::Vector2d& px);
-
 }  // namespace firstlook

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 
+#include "algorithms/vision/gray_sampling.hpp"
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/target_pattern.hpp"
 
@@ -24,7 +27,7 @@ double side_px(const Quad& quad) {
 /// Grey values of the cells of a candidate, border included, and of the paper around it.
 struct CellGrays {
   int cells = 0;
-  std::vector<double> gray;        ///< row by row
+  std::vector<double> gray;        ///< row by row; 0 where none was read
   double paper = 0;                ///< mean of all sides
   std::array<double, 4> beside{};  ///< the paper along each side
   [[nodiscard]] double at(int column, int row) const {
@@ -32,32 +35,63 @@ struct CellGrays {
   }
 };
 
-std::optional<CellGrays> read_cells(GrayImage image, const Quad& quad, int cells) {
-  const double n = cells;
-  const auto h = square_to_quad(n, quad);
-  if (!h) return std::nullopt;
-  CellGrays result{cells, {}, 0, {}};
-  for (int row = 0; row < cells; ++row) {
-    for (int column = 0; column < cells; ++column) {
-      double sum = 0;
-      for (const double dy : {0.3, 0.5, 0.7}) {
-        for (const double dx : {0.3, 0.5, 0.7}) {
-          sum += gray_between(image, apply_homography(*h, {column + dx, row + dy}));
-        }
-      }
-      result.gray.push_back(sum / 9);
+/// Reads the cells of one quadrangle after the other.
+class CellReader {
+ public:
+  /// Of `cells` each way; of the outer `unread` only the upper left one is.
+  CellReader(int cells, int unread) : cells_(cells) {
+    for (int i = 0; i < cells; ++i) {
+      for (const auto& [x, y] : {std::pair{i + 0.5, -0.4}, {i + 0.5, cells + 0.4}, {-0.4, i + 0.5}, {cells + 0.4, i + 0.5}})
+        x_.push_back(x), y_.push_back(y);
+    }
+    if (unread > 0) add_cell(0, 0);
+    for (int row = unread; row < cells - unread; ++row) {
+      for (int column = unread; column < cells - unread; ++column) add_cell(column, row);
+    }
+    u_.resize(x_.size()), v_.resize(x_.size()), grays_.resize(x_.size());
+  }
+
+  [[nodiscard]] std::optional<CellGrays> read(GrayImage image, const Quad& quad) {
+    const auto h = square_to_quad(cells_, quad);
+    if (!h) return std::nullopt;
+    project(*h);
+    grays_between(image, u_, v_, grays_);
+    CellGrays result{cells_, std::vector<double>(static_cast<std::size_t>(cells_ * cells_)), 0, {}};
+    auto gray = grays_.cbegin();
+    for (int i = 0; i < cells_; ++i) {
+      for (double& side : result.beside) side += *gray++ / cells_;
+    }
+    for (const double side : result.beside) result.paper += side / 4;
+    for (const std::size_t cell : order_) {
+      result.gray[cell] = std::accumulate(gray, gray + kSamples, 0.0) / kSamples;
+      gray += kSamples;
+    }
+    return result;
+  }
+
+ private:
+  static constexpr int kSamples = 9;  // of a cell
+
+  void add_cell(int column, int row) {
+    order_.push_back(static_cast<std::size_t>(row * cells_ + column));
+    for (const double dy : {0.3, 0.5, 0.7}) {
+      for (const double dx : {0.3, 0.5, 0.7}) x_.push_back(column + dx), y_.push_back(row + dy);
     }
   }
-  for (int i = 0; i < cells; ++i) {
-    const std::array<Eigen::Vector2d, 4> beside = {
-        {{i + 0.5, -0.4}, {i + 0.5, n + 0.4}, {-0.4, i + 0.5}, {n + 0.4, i + 0.5}}};
-    for (std::size_t side = 0; side < 4; ++side) {
-      result.beside[side] += gray_between(image, apply_homography(*h, beside[side])) / n;
+
+  void project(const Eigen::Matrix3d& h) {
+    for (std::size_t k = 0; k < x_.size(); ++k) {
+      const double x = x_[k], y = y_[k], w = h(2, 0) * x + h(2, 1) * y + h(2, 2);
+      u_[k] = (h(0, 0) * x + h(0, 1) * y + h(0, 2)) / w;
+      v_[k] = (h(1, 0) * x + h(1, 1) * y + h(1, 2)) / w;
     }
   }
-  for (const double side : result.beside) result.paper += side / 4;
-  return result;
-}
+
+  int cells_;
+  std::vector<double> x_, y_;             ///< samples, in cells from the quadrangle's first corner
+  std::vector<std::size_t> order_;        ///< cells that are read
+  std::vector<double> u_, v_, grays_;  ///< samples in the picture
+};
 
 /// False where something else than paper begins at a side: what is taken for that side may be the edge of a thing that
 /// hides a part of the marker.
@@ -180,12 +214,16 @@ std::optional<Reading> read_picture(const BoardSpec& board, const CellGrays& cel
   return Reading{0, best, 0};
 }
 
-std::optional<SquareMarker> recognise(GrayImage image, const BoardSpec& board, const CodeBook& book, Quad quad) {
-  const int cells = marker_cells(board);
-  const double border_cells = board.type == TargetType::kPatternMarker ? (cells - kPatternCells) / 2.0 : 1;
-  const double border_px = border_cells * side_px(quad) / cells;
+/// Cells from a marker's side to its code or picture.
+int border_cells(const BoardSpec& board) {
+  return board.type == TargetType::kPatternMarker ? (marker_cells(board) - kPatternCells) / 2 : 1;
+}
+
+std::optional<SquareMarker> recognise(GrayImage image, const BoardSpec& board, const CodeBook& book, CellReader& cells,
+                                      Quad quad) {
+  const double border_px = border_cells(board) * side_px(quad) / marker_cells(board);
   if (!refine_quad(image, border_px, QuadFit::kToRead, quad)) return std::nullopt;
-  const auto grays = read_cells(image, quad, cells);
+  const auto grays = cells.read(image, quad);
   if (!grays) return std::nullopt;
   std::optional<Reading> reading;
   if (board.type == TargetType::kPatternMarker) {
@@ -375,9 +413,11 @@ Result<std::vector<SquareMarker>> find_square_markers(GrayImage image, const Boa
   const auto quads = find_dark_quads(image);
   if (!quads) return std::unexpected(quads.error());
   const CodeBook book(board);
+  // Of a pattern marker's border one cell is compared with the paper, all of a code's.
+  CellReader cells(marker_cells(board), board.type == TargetType::kPatternMarker ? border_cells(board) : 0);
   std::vector<SquareMarker> found;
   for (const Quad& quad : *quads) {
-    if (auto marker = recognise(image, board, book, quad)) found.push_back(*marker);
+    if (auto marker = recognise(image, board, book, cells, quad)) found.push_back(*marker);
   }
   return only_once(std::move(found));
 }
