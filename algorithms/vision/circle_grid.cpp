@@ -15,6 +15,7 @@
 #include "algorithms/vision/gray_sampling.hpp"
 #include "algorithms/vision/homography.hpp"
 #include "algorithms/vision/lattice.hpp"
+#include "algorithms/vision/point_buckets.hpp"
 
 namespace firstlook {
 namespace {
@@ -49,13 +50,30 @@ bool is_same(const Disc& a, const Disc& b) {
   return large_px < 2 * small_px && (a.center - b.center).norm() < small_px / 2;
 }
 
-void add_discs(DarkOutlines& outlines, int window_px, std::vector<Disc>& discs) {
+/// Discs, none twice.
+class DiscSet {
+ public:
+  DiscSet(int width, int height) : centers_(width, height, kBucket_px) {}
+  [[nodiscard]] const std::vector<Disc>& discs() const { return discs_; }
+  void add(const Disc& disc) {
+    // The same disc has its centre within half of the smaller radius.
+    const auto same = [&](std::size_t d) { return is_same(discs_[d], disc); };
+    if (centers_.any_near(disc.center, disc.radius_px / 2, same)) return;
+    centers_.add(disc.center);
+    discs_.push_back(disc);
+  }
+
+ private:
+  static constexpr double kBucket_px = 16;
+  PointBuckets centers_;
+  std::vector<Disc> discs_;
+};
+
+void add_discs(DarkOutlines& outlines, int window_px, DiscSet& discs) {
   // The outline runs through the outermost pixels' centres.
   const auto may_be = [](int width, int height) { return (width - 1) * (height - 1) >= kAreaMin_px2; };
   outlines.for_each(window_px, may_be, [&](Outline outline) {
-    const auto disc = disc_of(outline);
-    const auto same = [&](const Disc& d) { return is_same(d, *disc); };
-    if (disc && std::none_of(discs.begin(), discs.end(), same)) discs.push_back(*disc);
+    if (const auto disc = disc_of(outline)) discs.add(*disc);
   });
 }
 
@@ -104,19 +122,38 @@ std::vector<LatticePlace> places_of(const BoardSpec& board) {
   return places;
 }
 
-/// Steps to the nearest disc and to the nearest one in another direction, clockwise.
-std::optional<LatticeSeed> seed_at(const std::vector<Disc>& discs, std::size_t p) {
+/// Discs of one target are as large as their neighbours, or nearly so.
+bool alike(const Disc& a, const Disc& b) {
+  const double ratio = b.radius_px / a.radius_px;
+  return ratio > 0.6 && ratio < 1.7;
+}
+
+/// The nearest discs like this one and their distances, nearest first; fewer where the picture has no more.
+std::vector<std::pair<double, std::size_t>> nearest_alike(const std::vector<Disc>& discs, const PointIndex& index,
+                                                          std::size_t p, std::size_t count) {
   std::vector<std::pair<double, std::size_t>> others;
-  for (std::size_t q = 0; q < discs.size(); ++q) {
-    const double ratio = discs[q].radius_px / discs[p].radius_px;
-    if (q != p && ratio > 0.6 && ratio < 1.7) others.emplace_back((discs[q].center - discs[p].center).norm(), q);
+  constexpr double kFirst_px = 32, kAll_px = 16384;  // check_image allows no picture with such a diagonal
+  for (double radius = kFirst_px; radius <= kAll_px && others.size() < count; radius *= 2) {
+    others.clear();
+    index.near(discs[p].center, radius, [&](std::size_t q, const Eigen::Vector2d& center) {
+      if (q == p || !alike(discs[p], discs[q])) return;
+      const double distance = (center - discs[p].center).norm();
+      if (distance <= radius) others.emplace_back(distance, q);
+    });
   }
-  constexpr std::size_t kNeighbours = 6;
-  if (others.size() < 3) return std::nullopt;
-  const std::size_t count = std::min(kNeighbours, others.size());
+  count = std::min(count, others.size());
   std::partial_sort(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(count), others.end());
+  others.resize(count);
+  return others;
+}
+
+/// Steps to the nearest disc and to the nearest one in another direction, clockwise.
+std::optional<LatticeSeed> seed_at(const std::vector<Disc>& discs, const PointIndex& index, std::size_t p) {
+  constexpr std::size_t kNeighbours = 6;
+  const auto others = nearest_alike(discs, index, p, kNeighbours);
+  if (others.size() < 3) return std::nullopt;
   const Eigen::Vector2d a = discs[others[0].second].center - discs[p].center;
-  for (std::size_t k = 1; k < count; ++k) {
+  for (std::size_t k = 1; k < others.size(); ++k) {
     const Eigen::Vector2d b = discs[others[k].second].center - discs[p].center;
     const double turn = a.x() * b.y() - a.y() * b.x();
     if (std::abs(turn) < 0.5 * a.norm() * b.norm()) continue;
@@ -136,15 +173,12 @@ std::vector<std::size_t> find_grid(const std::vector<Disc>& discs, const BoardSp
   int seeds = 0;
   std::vector<std::size_t> best;
   for (std::size_t p = 0; p < discs.size() && seeds < kSeedsMax && best.empty(); ++p) {
-    const auto seed = seed_at(discs, p);
+    const auto seed = seed_at(discs, index, p);
     if (!seed) continue;
     ++seeds;
-    const auto alike = [&](std::size_t a, std::size_t b) {
-      const double ratio = discs[b].radius_px / discs[a].radius_px;
-      return ratio > 0.6 && ratio < 1.7;
-    };
+    const auto fits = [&](std::size_t a, std::size_t b) { return alike(discs[a], discs[b]); };
     // A larger one is matched with no target, wherever its growth would end.
-    const auto grown = grower.grow(*seed, {0.3, alike, {}, lattice_size_max(places.size())});
+    const auto grown = grower.grow(*seed, {0.3, fits, {}, lattice_size_max(places.size())});
     double first_sum = 0;
     for (int turns = 0; turns < 4; ++turns) {
       const auto matches = match_lattice(grown, places, turns);
@@ -231,9 +265,10 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
   DarkOutlines outlines({smooth.data, smooth.cols, smooth.rows});
   constexpr std::array<int, 2> kWindows_px = {31, 91};
   std::vector<std::size_t> grid;
-  std::vector<Disc> discs;
+  DiscSet found(image.width, image.height);
+  const std::vector<Disc>& discs = found.discs();
   for (const int window : kWindows_px) {
-    add_discs(outlines, window, discs);
+    add_discs(outlines, window, found);
     grid = find_grid(discs, board);
     if (!grid.empty()) break;
   }

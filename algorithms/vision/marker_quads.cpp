@@ -13,6 +13,7 @@
 
 #include "algorithms/vision/dark_outlines.hpp"
 #include "algorithms/vision/gray_sampling.hpp"
+#include "algorithms/vision/point_buckets.hpp"
 #include "platform/core/fixed_vector.hpp"
 
 namespace firstlook {
@@ -59,16 +60,33 @@ std::optional<Quad> quad_of(Outline outline, double side_min_px) {
   return quad;
 }
 
-void add_quads(DarkOutlines& outlines, int window_px, double side_min_px, std::vector<Quad>& quads) {
+/// Quadrangles, none twice.
+class QuadSet {
+ public:
+  QuadSet(int width, int height) : middles_(width, height, kBucket_px) {}
+  [[nodiscard]] std::vector<Quad>& quads() { return quads_; }
+  void add(const Quad& quad) {
+    const double near_px = std::max(2.0, 0.1 * shortest_side(quad));
+    const Eigen::Vector2d middle = (quad[0] + quad[2]) / 2;
+    const auto same = [&](std::size_t q) { return is_same(quad, quads_[q], near_px); };
+    if (middles_.any_near(middle, 4 * near_px, same)) return;  // as far as is_same looks
+    middles_.add(middle);
+    quads_.push_back(quad);
+  }
+
+ private:
+  static constexpr double kBucket_px = 16;
+  PointBuckets middles_;
+  std::vector<Quad> quads_;
+};
+
+void add_quads(DarkOutlines& outlines, int window_px, double side_min_px, QuadSet& quads) {
   // No side is longer than the diagonal of the box.
-  const auto may_be = [&](int width, int height) { return std::hypot(width - 1, height - 1) >= side_min_px; };
+  const auto may_be = [&](int width, int height) {
+    return (width - 1) * (width - 1) + (height - 1) * (height - 1) >= side_min_px * side_min_px;
+  };
   outlines.for_each(window_px, may_be, [&](Outline outline) {
-    const auto quad = quad_of(outline, side_min_px);
-    if (!quad) return;
-    const double near_px = std::max(2.0, 0.1 * shortest_side(*quad));
-    if (std::none_of(quads.begin(), quads.end(), [&](const Quad& q) { return is_same(*quad, q, near_px); })) {
-      quads.push_back(*quad);
-    }
+    if (const auto quad = quad_of(outline, side_min_px)) quads.add(*quad);
   });
 }
 
@@ -83,10 +101,11 @@ std::vector<Quad> search(const cv::Mat& image, double side_min_px) {
   cv::GaussianBlur(searched, smooth, cv::Size(3, 3), 0);
   searched = smooth;
   DarkOutlines outlines({searched.data, searched.cols, searched.rows});
-  std::vector<Quad> quads;
+  QuadSet found(searched.cols, searched.rows);
   for (const int window : kWindows_px) {
-    add_quads(outlines, window, half ? side_min_px / 2 : side_min_px, quads);
+    add_quads(outlines, window, half ? side_min_px / 2 : side_min_px, found);
   }
+  std::vector<Quad> quads = std::move(found.quads());
   if (!half) return quads;
   for (Quad& quad : quads) {
     for (Eigen::Vector2d& p : quad) p = (p.array() + 0.5) * 2 - 0.5;
