@@ -268,7 +268,9 @@ Result<CornerSet> detect(GrayImage image, const BoardSpec& board) {
   DiscSet found(image.width, image.height);
   const std::vector<Disc>& discs = found.discs();
   for (const int window : kWindows_px) {
+    const std::size_t before = discs.size();
     add_discs(outlines, window, found);
+    if (discs.size() == before) continue;  // they were no grid
     grid = find_grid(discs, board);
     if (!grid.empty()) break;
   }

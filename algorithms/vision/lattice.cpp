@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <limits>
 #include <numeric>
 
 namespace firstlook {
@@ -169,21 +169,30 @@ std::vector<LatticeMatch> match_lattice(std::span<const LatticePoint> grown, std
     return matches;
   }
   std::vector<LatticePlace> taken;
-  std::map<std::pair<int, int>, std::size_t> point_at;
-  for (const LatticePoint& p : grown) {
-    const LatticePlace t = turned(p.i, p.j, quarter_turns);
-    taken.push_back(t);
-    point_at[{t.i, t.j}] = p.point;
-  }
+  taken.reserve(grown.size());
+  for (const LatticePoint& p : grown) taken.push_back(turned(p.i, p.j, quarter_turns));
   const auto have = range_of(taken), want = range_of(places);
+  // The lattice's points by their places, row by row.
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  const auto width = static_cast<std::size_t>(have[0].high - have[0].low + 1);
+  const auto height = static_cast<std::size_t>(have[1].high - have[1].low + 1);
+  std::vector<std::size_t> point_at(width * height, kNone);
+  const auto cell = [&](int i, int j) {
+    return static_cast<std::size_t>(j - have[1].low) * width + static_cast<std::size_t>(i - have[0].low);
+  };
+  const auto find = [&](int i, int j) {
+    const bool in = i >= have[0].low && i <= have[0].high && j >= have[1].low && j <= have[1].high;
+    return in ? point_at[cell(i, j)] : kNone;
+  };
+  for (std::size_t k = 0; k < taken.size(); ++k) point_at[cell(taken[k].i, taken[k].j)] = grown[k].point;
   const int slack = missing_max > 0 ? 2 : 0;  // rows or columns that may be missing at an edge
   for (int dj = have[1].low - want[1].low - slack; dj <= have[1].high - want[1].high + slack; ++dj) {
     for (int di = have[0].low - want[0].low - slack; di <= have[0].high - want[0].high + slack; ++di) {
       LatticeMatch match;
       for (const LatticePlace& place : places) {
-        const auto found = point_at.find({place.i + di, place.j + dj});
-        if (found == point_at.end() && ++match.found > missing_max) break;
-        match.points.push_back(found == point_at.end() ? std::nullopt : std::optional(found->second));
+        const std::size_t found = find(place.i + di, place.j + dj);
+        if (found == kNone && ++match.found > missing_max) break;
+        match.points.push_back(found == kNone ? std::nullopt : std::optional(found));
       }
       if (match.points.size() < places.size()) continue;
       match.found = places.size() - match.found;

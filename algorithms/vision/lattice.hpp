@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <span>
 #include <vector>
+
+#include "platform/core/function_ref.hpp"
 
 namespace firstlook {
 
@@ -69,7 +70,7 @@ struct LatticeSeed {
 struct LatticeGrowth {
   double tolerance = 0.3;  ///< how far from where it is looked for a neighbour may lie, in lengths of the step
   /// Whether point b can be a direct neighbour of point a.
-  std::function<bool(std::size_t a, std::size_t b)> fits;
+  FunctionRef<bool(std::size_t a, std::size_t b)> fits;
   /// Of several candidates the stronger wins over the nearer one; empty: all are alike.
   std::span<const float> strengths;
   /// A lattice of more points is not grown any further: it is too large already.

@@ -1,5 +1,6 @@
 #include "algorithms/vision/square_markers.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <bit>
@@ -39,7 +40,7 @@ struct CellGrays {
 class CellReader {
  public:
   /// Of `cells` each way; of the outer `unread` only the upper left one is.
-  CellReader(int cells, int unread) : cells_(cells) {
+  CellReader(int cells, int unread) : cells_(cells), unread_(unread) {
     for (int i = 0; i < cells; ++i) {
       for (const auto& [x, y] : {std::pair{i + 0.5, -0.4}, {i + 0.5, cells + 0.4}, {-0.4, i + 0.5}, {cells + 0.4, i + 0.5}})
         x_.push_back(x), y_.push_back(y);
@@ -49,6 +50,27 @@ class CellReader {
       for (int column = unread; column < cells - unread; ++column) add_cell(column, row);
     }
     u_.resize(x_.size()), v_.resize(x_.size()), grays_.resize(x_.size());
+  }
+
+  /// False when the cells in the middle, beyond those that are not read, would all be as grey as each other: no cell is
+  /// darker or brighter than its pixels.
+  [[nodiscard]] bool may_have_contrast(GrayImage image, const Quad& quad) const {
+    const auto h = square_to_quad(cells_, quad);
+    if (!h) return false;
+    const double low = unread_, high = cells_ - unread_;
+    Eigen::AlignedBox2d box;
+    for (const double x : {low, high}) {
+      for (const double y : {low, high}) box.extend(apply_homography(*h, {x, y}));
+    }
+    const auto pixel = [](double x, int count) { return static_cast<int>(std::clamp(x, 0.0, count - 1.0)); };
+    const int right = pixel(box.max().x() + 1, image.width), bottom = pixel(box.max().y() + 1, image.height);
+    std::uint8_t darkest = 255, brightest = 0;
+    for (int v = pixel(box.min().y(), image.height); v <= bottom; ++v) {
+      for (int u = pixel(box.min().x(), image.width); u <= right; ++u) {
+        darkest = std::min(darkest, image.at(u, v)), brightest = std::max(brightest, image.at(u, v));
+      }
+    }
+    return brightest - darkest >= kContrastMin;
   }
 
   [[nodiscard]] std::optional<CellGrays> read(GrayImage image, const Quad& quad) {
@@ -81,13 +103,13 @@ class CellReader {
 
   void project(const Eigen::Matrix3d& h) {
     for (std::size_t k = 0; k < x_.size(); ++k) {
-      const double x = x_[k], y = y_[k], w = h(2, 0) * x + h(2, 1) * y + h(2, 2);
-      u_[k] = (h(0, 0) * x + h(0, 1) * y + h(0, 2)) / w;
-      v_[k] = (h(1, 0) * x + h(1, 1) * y + h(1, 2)) / w;
+      const double x = x_[k], y = y_[k], scale = 1 / (h(2, 0) * x + h(2, 1) * y + h(2, 2));
+      u_[k] = (h(0, 0) * x + h(0, 1) * y + h(0, 2)) * scale;
+      v_[k] = (h(1, 0) * x + h(1, 1) * y + h(1, 2)) * scale;
     }
   }
 
-  int cells_;
+  int cells_, unread_;
   std::vector<double> x_, y_;             ///< samples, in cells from the quadrangle's first corner
   std::vector<std::size_t> order_;        ///< cells that are read
   std::vector<double> u_, v_, grays_;  ///< samples in the picture
@@ -223,6 +245,7 @@ std::optional<SquareMarker> recognise(GrayImage image, const BoardSpec& board, c
                                       Quad quad) {
   const double border_px = border_cells(board) * side_px(quad) / marker_cells(board);
   if (!refine_quad(image, border_px, QuadFit::kToRead, quad)) return std::nullopt;
+  if (board.type == TargetType::kPatternMarker && !cells.may_have_contrast(image, quad)) return std::nullopt;
   const auto grays = cells.read(image, quad);
   if (!grays) return std::nullopt;
   std::optional<Reading> reading;
