@@ -10,10 +10,10 @@
 
 namespace firstlook {
 
-/// Grows lattices from the saddle points of `image` until one is exactly the board: all its corners, row by row, x cross y
-/// away from the viewer; empty when none is. Up to a quarter of the corners may be missing among the saddle points
-/// (noise, blur, glare) when the image has a corner where the others put it; hidden corners are not made up. The order
-/// may still be off by half a turn.
+/// Grows lattices from the saddle points of `image` until one is exactly the board: all its corners, row by row, x
+/// cross y away from the viewer; empty when none is. Up to a quarter of the corners may be missing among the saddle
+/// points (noise, blur, glare) when the image has a corner where the others put it; hidden corners are not made up. The
+/// order may still be off by half a turn.
 [[nodiscard]] std::vector<Eigen::Vector2d> find_checkerboard_lattice(GrayImage image, const SaddlePoints& saddles,
                                                                      const BoardSpec& board);
 

@@ -12,8 +12,7 @@ namespace firstlook {
 namespace {
 
 /// Counterclockwise in the picture, from the right.
-constexpr std::array<Pixel, 8> kNeighbours = {
-    {{1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
+constexpr std::array<Pixel, 8> kNeighbours = {{{1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
 constexpr std::size_t kLeft = 4;
 
 /// Bit of a pixel's surroundings (see `surroundings`) that is set when a neighbour is dark.
@@ -133,7 +132,7 @@ Outline DarkOutlines::follow(Pixel first, std::size_t length_max) {
   do {
     to = (to - 1) % kNeighbours.size();
   } while (start[steps[to]] == 0 && to != kLeft);
-  if (to == kLeft) return Outline(outline_).first(1);   // a single pixel
+  if (to == kLeft) return Outline(outline_).first(1);  // a single pixel
   const std::uint8_t* const last = start + steps[to];  // from where the outline comes back
   const std::uint8_t* here = start;
   Pixel at = first;

@@ -21,8 +21,8 @@ using Outline = std::span<const Pixel>;
 /// Finds the outer outlines of an image's dark areas; one object for all windows, whose memory it takes once.
 ///
 /// The outlines are those of cv::findContours (Suzuki & Abe 1985) from the same first pixels, without those of the
-/// holes, of which a noisy picture has 100,000: areas are told apart by runs (He, Chao, Suzuki 2008: two tables of labels
-/// made one), of which only those of two rows are kept, and outlines are followed by a table of turns.
+/// holes, of which a noisy picture has 100,000: areas are told apart by runs (He, Chao, Suzuki 2008: two tables of
+/// labels made one), of which only those of two rows are kept, and outlines are followed by a table of turns.
 class DarkOutlines {
  public:
   /// Keeps a reference to the pixels.
@@ -54,14 +54,16 @@ class DarkOutlines {
   std::uint32_t whole_of(std::uint32_t area);
   std::uint32_t unite(std::uint32_t a, std::uint32_t b);
   [[nodiscard]] Outline follow(Pixel first, std::size_t length_max);
-  [[nodiscard]] std::uint8_t* dark_row(int row) { return dark_.data() + static_cast<std::ptrdiff_t>(row + 1) * stride_ + 1; }
+  [[nodiscard]] std::uint8_t* dark_row(int row) {
+    return dark_.data() + static_cast<std::ptrdiff_t>(row + 1) * stride_ + 1;
+  }
 
   GrayImage image_;
   std::ptrdiff_t stride_;
   /// 255, else 0; with a border of light pixels. Before: the means of the windows around each pixel.
   std::vector<std::uint8_t> dark_;
-  std::vector<int> edges_;          ///< where runs of a row begin and end, by turns
-  std::vector<Run> above_, here_;   ///< runs of two rows
+  std::vector<int> edges_;         ///< where runs of a row begin and end, by turns
+  std::vector<Run> above_, here_;  ///< runs of two rows
   std::vector<Area> areas_;
   std::vector<Pixel> outline_;
 };

@@ -125,7 +125,7 @@ Eigen::Vector2d LatticeGrower::step_from(std::size_t n, int di, int dj) const {
   // The step that led here along the same line, else the one beside it, is the better guide.
   const int behind = node_at(from.i - di, from.j - dj);
   if (behind >= 0) {
-    const Eigen::Vector2d step = px(static_cast<int>(n)) - px(behind);
+    Eigen::Vector2d step = px(static_cast<int>(n)) - px(behind);
     const int further = node_at(from.i - 2 * di, from.j - 2 * dj);
     if (further < 0) return step;
     // Perspective makes the steps of a row grow or shrink by nearly the same factor each time.

@@ -100,7 +100,7 @@ class LatticeGrower {
 
   const PointIndex& index_;
   std::vector<std::uint8_t> used_;  ///< 1 for points that have a place
-  std::vector<int> field_;    ///< node at each place, or -1
+  std::vector<int> field_;          ///< node at each place, or -1
   std::vector<LatticePoint> nodes_;
   std::vector<Steps> steps_;  ///< at each node
 };

@@ -136,9 +136,9 @@ constexpr std::size_t kSidePointsMax = 60;
 using EdgePoints = FixedVector<EdgePoint, kSidePointsMax>;
 using Lanes = std::array<double, kSidePointsMax>;  ///< a number for each point of a side
 
-/// Where the grey values rise across the side, within `reach_px` of its present curve, at `count` places: the centres of
-/// the rises. (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth of a
-/// pixel.)
+/// Where the grey values rise across the side, within `reach_px` of its present curve, at `count` places: the centres
+/// of the rises. (The centre of their squares would bear more noise, but is drawn to the pixels' grid by up to a tenth
+/// of a pixel.)
 EdgePoints edge_points(GrayImage image, const Side& side, double length_px, double reach_px, int count) {
   constexpr double kStep_px = 0.5;
   constexpr double kRiseMin = 8;  // grey levels, all rises together

@@ -82,7 +82,7 @@ void mark_peaks(const std::array<std::vector<float>, 3>& rows, std::vector<std::
     // Not >= on both sides: two equal neighbours count once.
     const bool above_those_before = (here > a[u - 1]) & (here > a[u]) & (here > a[u + 1]) & (here > b[u - 1]);
     const bool not_below_those_after = (here >= b[u + 1]) & (here >= c[u - 1]) & (here >= c[u]) & (here >= c[u + 1]);
-    out[u] = (here >= kResponseMin) & above_those_before & not_below_those_after ? 1 : 0;
+    out[u] = ((here >= kResponseMin) & above_those_before & not_below_those_after) ? 1 : 0;
   }
 }
 

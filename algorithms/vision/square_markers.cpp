@@ -42,7 +42,8 @@ class CellReader {
   /// Of `cells` each way; of the outer `unread` only the upper left one is.
   CellReader(int cells, int unread) : cells_(cells), unread_(unread) {
     for (int i = 0; i < cells; ++i) {
-      for (const auto& [x, y] : {std::pair{i + 0.5, -0.4}, {i + 0.5, cells + 0.4}, {-0.4, i + 0.5}, {cells + 0.4, i + 0.5}})
+      for (const auto& [x, y] :
+           {std::pair{i + 0.5, -0.4}, {i + 0.5, cells + 0.4}, {-0.4, i + 0.5}, {cells + 0.4, i + 0.5}})
         x_.push_back(x), y_.push_back(y);
     }
     if (unread > 0) add_cell(0, 0);
@@ -110,8 +111,8 @@ class CellReader {
   }
 
   int cells_, unread_;
-  std::vector<double> x_, y_;             ///< samples, in cells from the quadrangle's first corner
-  std::vector<std::size_t> order_;        ///< cells that are read
+  std::vector<double> x_, y_;          ///< samples, in cells from the quadrangle's first corner
+  std::vector<std::size_t> order_;     ///< cells that are read
   std::vector<double> u_, v_, grays_;  ///< samples in the picture
 };
 

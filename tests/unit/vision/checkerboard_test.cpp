@@ -105,6 +105,23 @@ TEST_CASE("a clean wall has no saddle points, a board has one for each corner", 
   CHECK(find_saddle_points(wall.view()).size() < saddle_points_min(board.corners()));
 }
 
+TEST_CASE("a picture with too many saddle points is known by the first of them", "[vision]") {
+  Random random(2);
+  std::vector<std::uint8_t> noise(320 * 240);
+  for (auto& pixel : noise) pixel = static_cast<std::uint8_t>(random.below(256));
+  const GrayImage image{noise.data(), 320, 240};
+  const SaddlePoints all = find_saddle_points(image);
+  REQUIRE(all.size() > 500);
+  for (const std::size_t count_max : {std::size_t{0}, std::size_t{100}, all.size() - 1, all.size(), all.size() + 1}) {
+    const SaddlePoints some = find_saddle_points(image, count_max);
+    CAPTURE(count_max);
+    REQUIRE(some.size() == std::min(all.size(), count_max + 1));
+    CHECK(std::equal(some.begin(), some.end(), all.begin(), [](const SaddlePoint& a, const SaddlePoint& b) {
+      return a.u == b.u && a.v == b.v && a.xy == b.xy;
+    }));
+  }
+}
+
 TEST_CASE("frames are averaged, a frame that disagrees is left out", "[vision]") {
   const CornerSet a{{{1, 1}, {2, 2}}, 0.1}, b{{{1.2, 1}, {2.2, 2}}, 0.1}, moved{{{9, 9}, {12, 12}}, 0.1};
   const std::vector<CornerSet> frames{a, moved, b};
