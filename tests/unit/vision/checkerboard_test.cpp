@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <numbers>
 
+#include "algorithms/vision/checkerboard_lattice.hpp"
 #include "algorithms/vision/saddle_points.hpp"
 #include "tests/unit/vision/draw_board.hpp"
 
@@ -119,6 +120,30 @@ TEST_CASE("a picture with too many saddle points is known by the first of them",
     CHECK(std::equal(some.begin(), some.end(), all.begin(), [](const SaddlePoint& a, const SaddlePoint& b) {
       return a.u == b.u && a.v == b.v && a.xy == b.xy;
     }));
+  }
+}
+
+TEST_CASE("corners that stand three times as far one way as the other are put in order", "[vision]") {
+  const BoardSpec board{9, 6, 0.03};
+  const std::vector<std::uint8_t> grey(640 * 480, 128);
+  for (const double small_px : {4.0, 7.0, 9.0, 14.0, 20.0}) {
+    for (const double ratio : {1.0, 2.0, 3.3}) {
+      SaddlePoints saddles;
+      for (int i = 0; i < board.corners(); ++i) {
+        const int column = i % board.inner_columns, row = i / board.inner_columns;
+        SaddlePoint s{static_cast<float>(40 + small_px * column), static_cast<float>(40 + ratio * small_px * row)};
+        s.xy = (column + row) % 2 == 0 ? 100.0F : -100.0F;
+        saddles.push_back(s);
+      }
+      const auto corners = find_checkerboard_lattice({grey.data(), 640, 480}, saddles, board);
+      CAPTURE(small_px, ratio);
+      REQUIRE(corners.size() == saddles.size());
+      const bool turned = corners[0].y() > 50;  // by half a turn: the caller settles that
+      for (std::size_t i = 0; i < saddles.size(); ++i) {
+        const SaddlePoint& s = saddles[turned ? saddles.size() - 1 - i : i];
+        CHECK(corners[i] == Eigen::Vector2d(s.u, s.v));
+      }
+    }
   }
 }
 
