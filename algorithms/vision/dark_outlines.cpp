@@ -11,6 +11,8 @@
 namespace firstlook {
 namespace {
 
+static_assert(std::endian::native == std::endian::little);  // several pixels are read as one number
+
 /// Counterclockwise in the picture, from the right.
 constexpr std::array<Pixel, 8> kNeighbours = {{{1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
 constexpr std::size_t kLeft = 4;
@@ -22,7 +24,7 @@ constexpr std::size_t bit_of(const Pixel& neighbour) {
 
 /// The 3x3 pixels around one as a number of nine bits, column by column.
 std::size_t surroundings(const std::uint8_t* pixel, std::ptrdiff_t stride) {
-  // The middle row's word begins with the pixel on the left; one byte of it is not looked at.
+  // Each row's word begins with the pixel on the left; its last byte is not looked at.
   std::uint32_t rows[3];
   for (std::ptrdiff_t v = 0; v < 3; ++v) std::memcpy(&rows[v], pixel + (v - 1) * stride - 1, sizeof rows[v]);
   constexpr std::uint32_t kOneOfEach = 0x010101;
