@@ -18,14 +18,15 @@ constexpr int kDepthMax = 14;
 double capsule_speed(const LinkTwists& twists, const Capsule& placed) {
   const Eigen::Vector3d& w = twists.angular[static_cast<std::size_t>(placed.link)];
   const double turn = w.norm();
-  double fastest = 0;
+  double fastest = 0;  // squared
   for (const Eigen::Vector3d* end : {&placed.a, &placed.b}) {
     const Eigen::Vector3d v = twists.velocity(placed.link, *end);
     const double along = turn > 0 ? v.dot(w) / turn : 0;
     const double across = std::sqrt(std::max(0.0, v.squaredNorm() - along * along));
-    fastest = std::max(fastest, std::hypot(along, across + turn * placed.radius_m));
+    const double widest = across + turn * placed.radius_m;
+    fastest = std::max(fastest, along * along + widest * widest);
   }
-  return fastest;
+  return std::sqrt(fastest);
 }
 
 class SpeedSearch {

@@ -1,5 +1,5 @@
 /// Eight numbers side by side: one AVX2 register, or what the compiler makes of it elsewhere; the same bits. For bodies
-/// of functions that exist twice, with FIRSTLOOK_AVX2 and without. Internal to algorithms/mapping.
+/// of functions that exist twice, with FIRSTLOOK_AVX2 and without. Internal to algorithms.
 #pragma once
 
 #include <array>

@@ -90,16 +90,6 @@ bool pairs_keep(const Capsules& placed, const SelfPairs& pairs, double margin_m)
   });
 }
 
-/// Whether every joint is at least `margin_rad` inside its limits.
-bool within_limits(const ArmModel& arm, const JointVector& q, double margin_rad) {
-  if (q.size() != arm.joints || !q.all_finite()) return false;
-  for (int j = 0; j < arm.joints; ++j) {
-    const auto i = static_cast<std::size_t>(j);
-    if (q[j] < arm.lower_rad[i] + margin_rad || q[j] > arm.upper_rad[i] - margin_rad) return false;
-  }
-  return true;
-}
-
 /// A stretch of the segment with what is still to be proven on it.
 struct Interval {
   double middle = 0;
@@ -236,6 +226,15 @@ class Proof {
 };
 
 }  // namespace
+
+bool within_limits(const ArmModel& arm, const JointVector& q, double margin_rad) {
+  if (q.size() != arm.joints || !q.all_finite()) return false;
+  for (int j = 0; j < arm.joints; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    if (q[j] < arm.lower_rad[i] + margin_rad || q[j] > arm.upper_rad[i] - margin_rad) return false;
+  }
+  return true;
+}
 
 double configuration_margin(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
                             const JointVector& q_rad) {

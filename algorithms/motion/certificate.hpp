@@ -16,6 +16,9 @@ inline constexpr double kMarginMin_m = 2e-4;
 inline constexpr double kLimitMargin_rad = 0.01;
 inline constexpr double kLimitTolerance_rad = 1e-3;
 
+/// Whether every joint is finite and at least `margin_rad` inside its limits.
+[[nodiscard]] bool within_limits(const ArmModel& arm, const JointVector& q_rad, double margin_rad);
+
 /// How much the body clears everything that is not free, and itself, beyond what is required (a lower bound: at most
 /// kAxisSpacing_m / 2 below what zone, field and keep-outs say along the axes, exact in the zone). Negative: not
 /// allowed. About 0.5 us.

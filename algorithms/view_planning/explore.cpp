@@ -1,9 +1,11 @@
 #include "algorithms/view_planning/explore.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
+#include "algorithms/motion/configuration_batch.hpp"
 #include "algorithms/view_planning/aim.hpp"
 #include "algorithms/view_planning/ray_walk.hpp"
 
@@ -20,8 +22,9 @@ constexpr double kAside_rad = 0.12;         // standard deviation of each joint 
 constexpr double kBackMax = 0.4;            // of the way to where the arm is, in every other step
 constexpr double kNearby_rad = 0.35;        // standard deviation of each joint around an earlier view
 constexpr double kHereShare = 0.25;         // of those: around where the arm is, which has just seen something new
-constexpr int kAimedTries = 10;             // for one of another source: most are given up before they cost anything
-constexpr int kInVainMax = 2;               // views in a row that make room for motion, and nothing comes of it
+constexpr std::size_t kDrawnAtOnce = 8;
+constexpr int kAimedTries = 10;  // for one of another source: most are given up before they cost anything
+constexpr int kInVainMax = 2;    // views in a row that make room for motion, and nothing comes of it
 constexpr double kStandOffMin_m = 0.6;
 constexpr double kStandOffMax_m = 1.5;
 constexpr double kAimCone_rad = 1.2;  // about the direction from unknown to free: 70 degrees, beyond it is grazing
@@ -146,15 +149,23 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
   // They take turns: random, nearby, aimed.
   const int source = index % kSources;
   out = Candidate{};
-  const int tries_max = task.options.tries_per_candidate * (source == 2 ? kAimedTries : 1);
-  while (!out.free && out.tries < tries_max) {
-    ++out.tries;
-    if (source == 2) {
+  if (source == 2) {
+    while (!out.free && out.tries < task.options.tries_per_candidate * kAimedTries) {
+      ++out.tries;
       out.free = draw_aimed(task, index / kSources, random, out.q);
-      continue;
     }
-    out.q = source == 0 ? draw_random(task, random) : draw_nearby(task, random);
-    out.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, out.q, kTargetMargin_m);
+    return;
+  }
+  while (!out.free && out.tries < task.options.tries_per_candidate) {
+    std::array<JointVector, kDrawnAtOnce> drawn;
+    std::array<std::uint8_t, kDrawnAtOnce> free{};
+    for (JointVector& q : drawn) q = source == 0 ? draw_random(task, random) : draw_nearby(task, random);
+    configurations_are_free(c.arm, c.body, c.space, c.clearance, drawn, kTargetMargin_m, free);
+    for (std::size_t i = 0; i < drawn.size() && !out.free && out.tries < task.options.tries_per_candidate; ++i) {
+      ++out.tries;
+      out.q = drawn[i];
+      out.free = free[i] != 0;
+    }
   }
 }
 

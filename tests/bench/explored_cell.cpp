@@ -78,9 +78,10 @@ void ExploredCell::look() {
   std::vector<float> self_m(values.size());
   const Capsules padded = place(body_.capsules, frames);
   render_self_depth({padded.data(), padded.size()}, 0.02, base_T_depth, c, self_m);
-  const auto inserted =
-      inserter_.insert(map_, {{values.data(), c.width, c.height}, 1000}, base_T_depth, self_m, now_s_);
+  const DepthImage depth{{values.data(), c.width, c.height}, 1000};
+  const auto inserted = inserter_.insert(map_, depth, base_T_depth, self_m, now_s_);
   if (!inserted) std::abort();
+  chooser_.gain().learn_returns(depth, base_T_depth, self_m);
   if (inserted->change.zone_revoked > 0) space_.zone_intact = false;
   map_.free_mask(now_s_, kFreeMaxAge_s, free_);
   field_.update(free_);

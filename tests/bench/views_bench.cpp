@@ -23,7 +23,7 @@ Result<ViewChoice> choose(ExploredCell& cell, const ViewContext& context, const 
 }
 
 void bench_choice(const Options& options, Report& report) {
-  constexpr int kCandidates = 720;  // of these at least 500 must be found free, as the goal says
+  constexpr int kCandidates = 840;  // of these at least 500 must be found free, as the goal says
   constexpr int kCandidatesMin = 500;
   ExploredCell cell("workshop", 1, kCandidates, kWorkers);
   WorkerPool workers(kWorkers);
