@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -21,7 +22,8 @@ constexpr double kDegree_rad = std::numbers::pi / 180;
 struct Candidate {
   JointVector q;
   std::uint32_t shown = 0;
-  double cost = 0;
+  double cost = 0;   ///< expected
+  double worth = 0;  ///< what it is expected to lower the cost by, for each second
 };
 
 /// Everything that one choice collects.
@@ -30,7 +32,8 @@ struct Search {
   const JointVector& current;
   const CalibrationViewOptions& options;
   Random random;
-  FixedVector<Candidate, kBestMax> best;  ///< cheapest first; of equal ones the earlier
+  double cost_now = 0;
+  FixedVector<Candidate, kBestMax> best;  ///< of most worth first; of equal ones the earlier
   int considered = 0;
   int feasible = 0;
 };
@@ -70,14 +73,29 @@ bool is_new(const Search& s, const JointVector& q) {
 
 void keep_when_good(Search& s, const Candidate& candidate) {
   if (s.best.full()) {
-    if (candidate.cost >= s.best.back().cost) return;
+    if (candidate.worth <= s.best.back().worth) return;
     s.best.pop_back();
   }
   const auto place = std::upper_bound(s.best.begin(), s.best.end(), candidate,
-                                      [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+                                      [](const Candidate& a, const Candidate& b) { return a.worth > b.worth; });
   const auto at = place - s.best.begin();
   s.best.push_back(candidate);
   std::rotate(s.best.begin() + at, s.best.end() - 1, s.best.end());
+}
+
+/// Of a view that shows these targets, one as good as the other.
+double likelihood(const CalibrationViewInputs& in, std::uint32_t shown, const Transform<Base, Flange>& base_T_flange) {
+  double sum = 0;
+  for (std::size_t k = 0; k < in.models.size(); ++k) {
+    if ((shown >> k & 1U) != 0) sum += sight_likelihood(in.models[k], k, base_T_flange, in.looks);
+  }
+  return sum / std::popcount(shown);
+}
+
+double seconds(const Search& s, const JointVector& q) {
+  if (s.options.stop_s <= 0) return 1;
+  const SegmentTiming move = time_segment(s.inputs.arm, s.inputs.body.capsules, s.current, q, s.options.speed);
+  return move.duration_s + s.options.stop_s;
 }
 
 /// Keeps q when it is new, sees a whole board that serves, is free and does not hide it: from cheap to dear.
@@ -99,7 +117,9 @@ void consider(Search& s, const JointVector& q) {
   if ((shown & useful) == 0) return;
   const Eigen::MatrixXd information = in.information + joint_view_information(in.models, shown, frames.flange());
   ++s.feasible;
-  keep_when_good(s, {q, shown, cost_of(information, s.options)});
+  const double likely = likelihood(in, shown & useful, frames.flange());
+  const double cost = likely * cost_of(information, s.options) + (1 - likely) * s.cost_now;
+  keep_when_good(s, {q, shown, cost, (s.cost_now - cost) / seconds(s, q)});
 }
 
 void draw_aimed(Search& s) {
@@ -188,6 +208,7 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
            .current = current,
            .options = options,
            .random = Random(options.seed, kStream + (std::uint64_t{options.step} << 20)),
+           .cost_now = cost_of(inputs.information, options),
            .best = {},
            .considered = 0,
            .feasible = 0};
@@ -200,12 +221,12 @@ Result<CalibrationViewChoice> next_calibration_view(const CalibrationViewInputs&
   choice.feasible = s.feasible;
   choice.before = predicted_hand_eye(inputs.information);
   choice.after = choice.before;
-  const double cost_max = cost_of(inputs.information, options) * (1 - options.cost_drop_min);
+  const double cost_max = s.cost_now * (1 - options.cost_drop_min);
   int plans = 0;
   for (const Candidate& candidate : s.best) {
     if (candidate.cost > cost_max) {
       choice.outcome = CalibrationViewChoice::Outcome::kNoneHelps;
-      break;
+      continue;
     }
     if (++plans > options.plans_max) break;
     const Result<Path> path = planner.plan_to(candidate.q);

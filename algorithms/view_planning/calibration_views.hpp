@@ -8,6 +8,7 @@
 #include "algorithms/calibration/view_spread.hpp"
 #include "algorithms/motion/planner.hpp"
 #include "algorithms/view_planning/base_turns.hpp"
+#include "algorithms/view_planning/board_sights.hpp"
 
 namespace firstlook {
 
@@ -20,6 +21,7 @@ struct CalibrationViewInputs {
   std::span<const ViewDesignModel> models;  ///< of each target whose place is known; a rough hand-eye and pose will do
   Eigen::MatrixXd information;              ///< joint_prior_information() plus joint_view_information() of each view
   std::span<const JointVector> taken;       ///< configurations of the views taken
+  std::span<const BoardLookOutcome> looks = {};  ///< what came of earlier views
 };
 
 enum class DesignCriterion : std::uint8_t {
@@ -43,8 +45,11 @@ struct CalibrationViewOptions {
   /// criterion is then that of their poses. 0: whatever serves the transform.
   std::uint32_t wanted = 0;
   double cost_lever_m = 1.0;     ///< design_cost: rotation counts as displacement at this distance
-  double cost_drop_min = 0.005;  ///< a view must lower the cost by this share
-  int plans_max = 12;            ///< best candidates that the planner may try
+  double cost_drop_min = 0.005;  ///< a view must be expected to lower the cost by this share
+  /// Of settling and looking: views go by how much they lower the cost for each second of the straight move and the
+  /// stop. 0: moves take no time, and the view is the one that lowers the cost most.
+  double stop_s = 0;
+  int plans_max = 12;  ///< best candidates that the planner may try
   int plan_iterations_max = 600;
   SpeedLimits speed;  ///< for the path's duration
 };

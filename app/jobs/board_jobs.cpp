@@ -178,6 +178,9 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     }
     if (observes) observe(stop, arguments, sight, seen, *pose);
   }
+  if (arguments.purpose == BoardLook::kCollect && (result.found || sight.still)) {
+    note_collect_look(last.at_rad, result.targets);
+  }
   if (!result.found) return result;
   last_stamp_s_ = std::max(last_stamp_s_, last.frame.stamp.seconds());
   if (observes) {
@@ -185,6 +188,14 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
     settle_observations(arguments.purpose);
   }
   return result;
+}
+
+void Workbench::note_collect_look(const JointVector& at_rad, TargetMask seen) {
+  if (collect_looks_.full()) {
+    std::rotate(collect_looks_.begin(), collect_looks_.begin() + 1, collect_looks_.end());
+    collect_looks_.pop_back();
+  }
+  collect_looks_.push_back({at_rad, static_cast<TargetMask>(targets_expected_ | seen), seen});
 }
 
 CheckBoardResult Workbench::check_board(const DetectArguments& arguments) {

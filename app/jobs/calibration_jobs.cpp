@@ -10,6 +10,7 @@
 
 namespace firstlook {
 namespace {
+constexpr double kViewStop_s = 3;           // what a view costs beside its move; with 2 to 7 it comes to much the same
 constexpr double kCrowded_rad = 0.1;        // joint distance of views where there is no room for more
 constexpr std::size_t kIndependentMin = 6;  // of so many views a solve can make something
 constexpr std::size_t kBootstrapViews = 4;  // three motions determine a rough transform, one more for a bad view
@@ -163,8 +164,22 @@ std::uint32_t Workbench::wanted_targets(const RoughModel& rough, std::span<const
   return wanted;
 }
 
+/// What came of the looks so far, with targets numbered as the models are.
+std::vector<BoardLookOutcome> Workbench::look_outcomes(const RoughModel& rough) const {
+  std::vector<BoardLookOutcome> outcomes;
+  for (const CollectLook& look : collect_looks_) {
+    BoardLookOutcome& outcome = outcomes.emplace_back(forward(arm_, look.at_rad).flange());
+    for (std::size_t m = 0; m < rough.targets.size(); ++m) {
+      outcome.expected |= (look.expected >> rough.targets[m] & 1U) << m;
+      outcome.seen |= (look.seen >> rough.targets[m] & 1U) << m;
+    }
+  }
+  return outcomes;
+}
+
 CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
   CalibrationViewResult result;
+  targets_expected_ = 0;
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   if (bootstrap_.empty()) bootstrap_.push_back(here.at_rad);  // where the board was seen is a view, too
   // Around where the arm is now, then around each view that saw the board, until enough views did.
@@ -208,12 +223,14 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.step = here.step;
   options.speed = limits_;
+  options.stop_s = kViewStop_s;
   const bool fixed = config_.calibration.views == "fixed48";
   options.wanted = fixed ? 0 : wanted_targets(*rough, counted);
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
   const Clearance clearance = blind_terms_.clearance();
+  const std::vector<BoardLookOutcome> looks = look_outcomes(*rough);
   const CalibrationViewInputs inputs{
-      arm_, envelope_body_, space, clearance, rough->models, information_of(*rough, counted), taken};
+      arm_, envelope_body_, space, clearance, rough->models, information_of(*rough, counted), taken, looks};
   CalibrationViewResult result;
   const PredictedSigma sigma = predicted_sigma(rough->covariance.value_or(predicted_hand_eye(inputs.information)));
   result.sigma_mm = 1000 * sigma.translation_m;
@@ -244,6 +261,10 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
     choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
   }
   if (found()) {
+    targets_expected_ = 0;
+    for (std::size_t m = 0; m < rough->targets.size(); ++m) {
+      targets_expected_ |= static_cast<TargetMask>((choice->shown >> m & 1U) << rough->targets[m]);
+    }
     result.found = true;
     result.path = route_of(choice->path, envelope_body_, limits_);
   } else if (too_few) {

@@ -228,6 +228,7 @@ class Workbench {
   void observe(std::size_t stop, const DetectArguments& arguments, const BoardSight& sight,
                const BoardSight::Target& seen, const BoardPose& pose);
   void settle_observations(BoardLook purpose);
+  void note_collect_look(const JointVector& at_rad, TargetMask seen);
   /// How many stops showed a target.
   [[nodiscard]] std::size_t stops() const;
   [[nodiscard]] const BoardSpec& board(int target) const { return boards_[static_cast<std::size_t>(target)]; }
@@ -244,6 +245,7 @@ class Workbench {
     std::vector<int> targets;             ///< that they are of
     std::optional<Matrix6d> covariance;
   };
+  [[nodiscard]] std::vector<BoardLookOutcome> look_outcomes(const RoughModel& rough) const;
   void place_targets(const ViewDesignModel& common, const std::vector<PosePair>& pairs,
                      std::span<const TargetPose> refined, RoughModel& rough) const;
   /// Information of the observations named, about the targets of the models.
@@ -315,6 +317,13 @@ class Workbench {
   std::vector<Observation> observations_;
   std::vector<WaySight> way_sights_;
   AlignmentRecord alignment_;
+  /// A look of the collection at boards, the latest last.
+  struct CollectLook {
+    JointVector at_rad;
+    TargetMask expected, seen;
+  };
+  FixedVector<CollectLook, 128> collect_looks_;
+  TargetMask targets_expected_ = 0;  ///< of the view that the arm is sent to
   Turns bootstrap_;
   std::size_t bootstrap_next_ = 0;
   int fixed_next_ = 0;                 ///< of next_fixed_view

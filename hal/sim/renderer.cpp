@@ -30,6 +30,14 @@ double neighbour_distance_m(const BoardSpec& board) {
   return board.has_marker_corners() ? board.mark_size_m : board.square_size_m;
 }
 
+/// What of a board a detector must see.
+InkExtent detected_part(const BoardSpec& board) {
+  if (board.type != TargetType::kCheckerboard) return ink_extent(board);
+  constexpr double kAround = 0.35;  // of a square: what tells that black and white alternate at a corner
+  const Eigen::Vector2d squares(board.inner_columns - 1 + 2 * kAround, board.inner_rows - 1 + 2 * kAround);
+  return {.center_m = ink_extent(board).center_m, .size_m = board.square_size_m * squares};
+}
+
 }  // namespace
 
 DepthSensorModel depth_sensor_model(const SensorPreset& preset) {
@@ -113,6 +121,11 @@ bool Renderer::sees(const Vector3d& from_m, const Vector3d& to_m) const {
 
 bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body, double margin_px,
                              std::size_t which) const {
+  return is_in_view(base_T_camera, body, margin_px, which, ink_extent(state_->scene.boards[which].spec));
+}
+
+bool Renderer::is_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body, double margin_px,
+                          std::size_t which, const InkExtent& part) const {
   const BoardPlacement& board = state_->scene.boards[which];
   const CameraIntrinsics& camera = state_->scene.mount.color;
   const Transform<Camera, Board> camera_T_board = base_T_camera.inverse() * board.base_T_board;
@@ -124,14 +137,13 @@ bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const
   if (width_px / board.spec.detail_ratio() < kSquareWidthMin_px) return false;
   const BodyImage hiding(body, base_T_camera.pose(), base_T_camera.translation());
   const Vector3d eye = base_T_camera.translation();
-  // A lattice over all the ink: for checkerboards the corners of all squares.
-  const InkExtent ink = ink_extent(board.spec);
+  // A lattice over the part: of a whole checkerboard the corners of all squares.
   const int columns = board.spec.inner_columns + 1, rows = board.spec.inner_rows + 1;
   for (int row = 0; row <= rows; ++row) {
     for (int column = 0; column <= columns; ++column) {
       const Eigen::Vector2d share(static_cast<double>(column) / columns - 0.5, static_cast<double>(row) / rows - 0.5);
-      const Eigen::Vector2d at_ink = ink.center_m + share.cwiseProduct(ink.size_m);
-      const Vector3d on_board(at_ink.x(), at_ink.y(), 0);
+      const Eigen::Vector2d in_part = part.center_m + share.cwiseProduct(part.size_m);
+      const Vector3d on_board(in_part.x(), in_part.y(), 0);
       const Vector3d at = camera_T_board * on_board;
       const auto pixel = project(camera, at);
       if (!pixel || !in_image(camera, *pixel, margin_px)) return false;
@@ -145,10 +157,9 @@ bool Renderer::board_in_view(const Transform<Base, Camera>& base_T_camera, const
 
 hal::CornerObservation Renderer::observe_corners(const Transform<Base, Camera>& base_T_camera, const Exposure& exposure,
                                                  std::size_t which, double sigma_px) const {
-  constexpr double kMargin_px = 8;
   hal::CornerObservation observation;
-  if (!board_in_view(base_T_camera, exposure.body, kMargin_px, which)) return observation;
   const BoardPlacement& board = state_->scene.boards[which];
+  if (!is_in_view(base_T_camera, exposure.body, kBoardMargin_px, which, detected_part(board.spec))) return observation;
   const Transform<Camera, Board> camera_T_board = base_T_camera.inverse() * board.base_T_board;
   Random random(mix64(exposure.seed) ^ exposure.frame, kCornerStream + (std::uint64_t{which} << 32));
   for (int i = 0; i < board.spec.corners(); ++i) {

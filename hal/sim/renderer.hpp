@@ -9,6 +9,7 @@
 
 #include "algorithms/kinematics/arm_model.hpp"
 #include "algorithms/mapping/sensor_presets.hpp"
+#include "algorithms/vision/target_pattern.hpp"
 #include "hal/api/cameras.hpp"
 #include "hal/sim/ray_tracer.hpp"
 #include "hal/sim/scene.hpp"
@@ -57,6 +58,8 @@ struct Overview {
 /// thread-safe (Embree, AVX2). The threads of `workers`, which must outlive it, share the rows of a camera's image.
 class Renderer {
  public:
+  static constexpr double kBoardMargin_px = 8;
+
   explicit Renderer(const Scene& scene, const DepthSensorModel& sensor = {}, WorkerPool* workers = nullptr);
   ~Renderer();
   Renderer(Renderer&&) noexcept;
@@ -75,14 +78,15 @@ class Renderer {
   /// Millimetres along the optical axis, 0 without return; `out` has the size of depth_intrinsics(detail).
   void render_depth(const Transform<Base, Depth>& base_T_depth, const Exposure& exposure, DepthDetail detail,
                     ImageView<std::uint16_t> out) const;
-  /// The corners of one of the scene's boards with `sigma_px` of noise; empty unless board_in_view.
+  /// The corners of one of the scene's boards with `sigma_px` of noise; empty unless a detector would find them: as
+  /// board_in_view, but of a checkerboard the surroundings of its inner corners are enough.
   [[nodiscard]] hal::CornerObservation observe_corners(const Transform<Base, Camera>& base_T_camera,
                                                        const Exposure& exposure, std::size_t which = 0,
                                                        double sigma_px = 0.1) const;
   /// True when the camera sees the whole pattern: inside the picture with `margin_px`, from the front at a tilt of at
   /// most 70 degrees, squares at least 6 px wide, nothing in between.
   [[nodiscard]] bool board_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body,
-                                   double margin_px = 8, std::size_t which = 0) const;
+                                   double margin_px = kBoardMargin_px, std::size_t which = 0) const;
 
   /// Distance to the first surface along a unit direction, the arm left out; infinity when there is none. To 1e-5 m.
   [[nodiscard]] double ray_m(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction) const;
@@ -98,6 +102,8 @@ class Renderer {
 
  private:
   struct State;
+  [[nodiscard]] bool is_in_view(const Transform<Base, Camera>& base_T_camera, const Capsules& body, double margin_px,
+                                std::size_t which, const InkExtent& part) const;
   std::unique_ptr<State> state_;
 };
 

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <thread>
 
+#include "algorithms/view_planning/aim.hpp"
 #include "algorithms/vision/camera_model.hpp"
 #include "algorithms/vision/checkerboard.hpp"
+#include "algorithms/vision/target_detection.hpp"
 #include "hal/sim/cell_file.hpp"
 #include "hal/sim/random_cell.hpp"
 #include "platform/core/random.hpp"
@@ -244,6 +246,35 @@ TEST_CASE("observed corners scatter about the truth by their sigma, and are miss
   const Transform<Base, Camera> from_behind(Eigen::Quaterniond(pose.rotation()),
                                             Vector3d(2 * center - pose.translation()));
   CHECK(renderer.observe_corners(from_behind, {}).corners_px.empty());
+}
+
+TEST_CASE("corners are observed where the detector finds them in the picture") {
+  const Result<Scene> scene = load_cell("empty", 1);
+  REQUIRE(scene);
+  const Renderer renderer(*scene);
+  const BoardPlacement& board = scene->boards.front();
+  const CameraIntrinsics& camera = scene->mount.color;
+  const Vector3d center = board.base_T_board * board.spec.center();
+  Random random(7, 1);
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
+  int both = 0, observed_only = 0, detected_only = 0;
+  for (std::uint64_t frame = 0; frame < 120; ++frame) {
+    // From near, where parts of the board leave the picture, and tilted.
+    const Vector3d front = -board.base_T_board.rotation().col(2);
+    const Vector3d direction = direction_within(front, 0.8, random);
+    const double distance_m = random.uniform(0.3, 0.8);
+    const auto pose = look_at<Camera>(center + 0.05 * random.normal3(), direction, distance_m, random.uniform(0, 6.28));
+    const bool observed = !renderer.observe_corners(pose, {{}, 1, frame}).corners_px.empty();
+    renderer.render_color(pose, {{}, 1, frame}, {pixels.data(), camera.width, camera.height});
+    const bool detected = detect_target({pixels.data(), camera.width, camera.height}, board.spec).has_value();
+    both += observed && detected ? 1 : 0;
+    observed_only += observed && !detected ? 1 : 0;
+    detected_only += !observed && detected ? 1 : 0;
+  }
+  CAPTURE(both, observed_only, detected_only);
+  CHECK(both > 40);
+  CHECK(observed_only <= 2);
+  CHECK(detected_only * 10 <= both);
 }
 
 TEST_CASE("rays and lines of sight end at surfaces") {
