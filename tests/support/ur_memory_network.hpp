@@ -69,7 +69,8 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
                                : service == ur::Service::kDashboard ? sim::ur::Port::kDashboard
                                                                     : sim::ur::Port::kPrimary;
     const ur::LinkId link = free_slot();
-    if (link != ur::kNoLink) slots_[at(link)] = {Slot::Kind::kSession, plugged_ ? &robot_.open(port) : nullptr, 0};
+    if (link != ur::kNoLink)
+      slots_[at(link)] = {Slot::Kind::kSession, plugged_ && robot_.serves(port) ? &robot_.open(port) : nullptr, 0};
     return link;
   }
   ur::LinkId accept(ur::Door door) override {
