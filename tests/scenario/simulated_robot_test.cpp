@@ -56,6 +56,11 @@ TEST_CASE("what happens to arm, link and operator happens to the simulated contr
     const Json result = folder.read_json("run/result.json");
     check_safe(result);
     CHECK(folder.run({"replay", "run/journal.flj"}).exit_code == 0);
+    // A turn of the loop and a cycle of a CB3; of a link the silence that tells, besides.
+    const Json answered_s = result["robot"]["stop_answered_within_s"];
+    const Json lost_s = result["robot"]["link_loss_answered_within_s"];
+    if (!answered_s.is_null()) CHECK(answered_s.get<double>() <= 0.0101);
+    if (!lost_s.is_null()) CHECK(lost_s.get<double>() <= 0.1101);
     if (run.exit_code == 0) return std::string("done");
     CHECK(run.exit_code == 6);
     CHECK(result["safety"]["stops"].size() == 1);
@@ -67,6 +72,86 @@ TEST_CASE("what happens to arm, link and operator happens to the simulated contr
   CHECK(ends("link.lost_at=20") == "E5002");
   CHECK(ends("operator.play_at=never") == "E5008");
   CHECK(ends("operator.pause_at=20:300") == "done");
+}
+
+namespace {
+
+/// Somebody who watches a whole job: it is done, or stopped safely, and can say why.
+std::string whole_job(const std::vector<std::string>& happens) {
+  const JobFolder folder;
+  std::vector<std::string> words = {"--robot", "simulated"};
+  for (const std::string& what : happens) words.insert(words.end(), {"--robot-at", what});
+  const ProgramResult run = folder.run_job("run", words);
+  INFO(run.err);
+  const Json result = folder.read_json("run/result.json");
+  check_safe(result);
+  CHECK(folder.run({"replay", "run/journal.flj"}).exit_code == 0);
+  const Json answered_s = result["robot"]["stop_answered_within_s"];
+  if (!answered_s.is_null()) CHECK(answered_s.get<double>() <= 0.0101);
+  if (run.exit_code == 0) {
+    CHECK(result["truth"]["false_free_voxels"] == 0);
+    return "done";
+  }
+  CHECK(run.exit_code == 6);
+  CHECK(result["safety"]["stops"].size() == 1);
+  return result["reason"].get<std::string>().substr(0, 5);
+}
+
+}  // namespace
+
+TEST_CASE("whole jobs meet what can happen to a robot: done, or stopped with a reason", "[scenario]") {
+  CHECK(whole_job({"40=pause", "220=play", "250=pause", "252=play"}) == "done");
+  CHECK(whole_job({"35.3=protective-stop-paused"}) == "E5004");
+  CHECK(whole_job({"120=unplug", "120.6=plug"}) == "E5002");
+  CHECK(whole_job({"61.7=reboot"}) == "E5002");
+  CHECK(whole_job({"90=open-safeguard", "93=close-safeguard"}) == "E5004");
+  CHECK(whole_job({"30=slider=0.3", "60=slider=1", "75=clock=3600"}) == "done");
+}
+
+TEST_CASE("a whole job on an e-Series; a TCP, mounting and factory correction that are another's are refused",
+          "[scenario]") {
+  const JobFolder folder;
+  folder.write("cell.yaml",
+               "arm: ur5e\nwalls: {low_m: [-2.0, -1.9], high_m: [2.1, 2.0], height_m: 2.6}\n"
+               "board: {center_m: [0.89, 0.45, 0.42], faces: [-0.89, -0.45, 0.35]}\n");
+  const auto run = [&](const std::string& out, const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"run",  "--cell", "cell.yaml", "--seed",  "3",        "--sensor",
+                                      "fast", "--out",  out,         "--robot", "simulated"};
+    words.insert(words.end(), more.begin(), more.end());
+    return folder.run(words);
+  };
+  const ProgramResult done = run("run", {});
+  INFO(done.err);
+  REQUIRE(done.exit_code == 0);
+  const Json result = folder.read_json("run/result.json");
+  check_safe(result);
+  CHECK(result["robot"]["model"] == "ur5e");
+  CHECK(result["robot"]["software"].get<std::string>().starts_with("5."));
+  CHECK(result["robot"]["kinematics"]["file"].is_null());
+  CHECK(result["robot"]["kinematics"]["ur_calibration_hash"].get<std::string>().starts_with("calib_"));
+
+  folder.write("tcp.yaml", "robot: {tcp_offset: [0, 0, 0.1, 0, 0, 0]}\n");
+  const ProgramResult tcp = run("tcp", {"--config", "tcp.yaml"});
+  CHECK(tcp.exit_code == 3);
+  CHECK(tcp.err.find("robot.tcp_offset") != std::string::npos);
+  folder.write("tilted.yaml", "arm: {mounting: tilted}\n");
+  const ProgramResult tilted = run("tilted", {"--config", "tilted.yaml"});
+  CHECK(tilted.exit_code == 3);
+  CHECK(tilted.err.find("arm.mounting") != std::string::npos);
+  // The published UR5e: not this robot.
+  folder.write("published.yaml",
+               "kinematics:\n  shoulder: {x: 0, y: 0, z: 0.1625, roll: 0, pitch: 0, yaw: 0}\n"
+               "  upper_arm: {x: 0, y: 0, z: 0, roll: 1.570796327, pitch: 0, yaw: 0}\n"
+               "  forearm: {x: -0.425, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}\n"
+               "  wrist_1: {x: -0.3922, y: 0, z: 0.1333, roll: 0, pitch: 0, yaw: 0}\n"
+               "  wrist_2: {x: 0, y: -0.0997, z: 0, roll: 1.570796327, pitch: 0, yaw: 0}\n"
+               "  wrist_3: {x: 0, y: 0.0996, z: 0, roll: 1.570796326589793, pitch: 3.141592653589793, yaw: "
+               "3.141592653589793}\n  hash: calib_12788084448423163542\n");
+  folder.write("other.yaml", "robot: {calibration_file: published.yaml}\n");
+  const ProgramResult other = run("other", {"--config", "other.yaml"});
+  CHECK(other.exit_code == 3);
+  CHECK(other.err.find("robot.calibration_file") != std::string::npos);
+  CHECK(other.err.find("calib_12788084448423163542") != std::string::npos);
 }
 
 TEST_CASE("what a simulated controller cannot be", "[scenario]") {
