@@ -90,7 +90,7 @@ Result<ArmModel> NetworkArm::read_file(const std::string& path, const ArmModel& 
   constexpr double kSame_m = 2e-5, kSame_rad = 2e-5;
   const auto file = read_ur_calibration(path);
   if (!file) return failure(file.error().fault, "robot.calibration_file: {}", file.error().detail());
-  const ArmModel arm = with_factory_frames(published, file->frames).arm;
+  ArmModel arm = with_factory_frames(published, file->frames).arm;
   const FlangeDifference off = flange_difference(arm, told);
   if (off.m > kSame_m || off.rad > kSame_rad) {
     return failure(

@@ -1,5 +1,7 @@
 /// The job over the protocols of a UR controller in virtual time: the controller in the same process, or in lockstep in
 /// another one.
+#include "app/config/ur_calibration_file.hpp"
+#include "tests/support/ur_correction.hpp"
 #include "tests/support/ur_sim_process.hpp"
 
 namespace firstlook {
@@ -152,6 +154,58 @@ TEST_CASE("a whole job on an e-Series; a TCP, mounting and factory correction th
   CHECK(other.exit_code == 3);
   CHECK(other.err.find("robot.calibration_file") != std::string::npos);
   CHECK(other.err.find("calib_12788084448423163542") != std::string::npos);
+}
+
+namespace {
+
+/// The kinematics that a controller tells on its primary interface.
+std::array<DhRow, 6> told_rows(const UrSim& robot) {
+  Connection primary(robot, 30001);
+  std::array<DhRow, 6> rows{};
+  for (bool found = false; !found;) {
+    REQUIRE(primary.receive());
+    for (const UrPacket& packet : take_packets(primary.received)) {
+      if (packet.type != 16) continue;
+      std::string parts = packet.content;
+      for (const UrPacket& part : take_packets(parts)) {
+        if (part.type != 5) continue;
+        found = true;
+        for (std::size_t j = 0; j < 6; ++j) {
+          const auto column = [&](std::size_t i) { return double_at(part.content, 24 + 48 * i + 8 * j); };
+          rows[j] = {.theta_offset_rad = column(0), .d_m = column(2), .a_m = column(1), .alpha_rad = column(3)};
+        }
+      }
+    }
+  }
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("a job on a robot whose factory correction comes from a file of ROS", "[scenario]") {
+  const JobFolder folder;
+  std::string hash;
+  {
+    const UrSim robot({"--cell", "empty", "--seed", "1", "--running"});
+    const auto rows = told_rows(robot);
+    hash = ur_calibration_hash(rows);
+    folder.write("robot.yaml", UrCorrection(rows).yaml(hash));
+  }
+  folder.write("site.yaml", "robot: {calibration_file: robot.yaml}\n");
+  const ProgramResult run =
+      folder.run_job("run", {"--only", "calibrate", "--robot", "simulated", "--config", "site.yaml"});
+  INFO(run.err);
+  REQUIRE(run.exit_code == 0);
+  const Json kinematics = folder.read_json("run/result.json")["robot"]["kinematics"];
+  CHECK(kinematics["ur_calibration_hash"] == hash);
+  CHECK(kinematics["file"]["path"] == "robot.yaml");
+  CHECK(kinematics["file"]["hash_agrees"] == true);
+  CHECK(kinematics["file"]["flange_off_m"].get<double>() < 1e-9);
+  CHECK(folder.read("run/report.html").find(hash) != std::string::npos);
+  const ProgramResult another = folder.run({"run", "--cell", "empty", "--seed", "2", "--sensor", "fast", "--out",
+                                            "another", "--robot", "simulated", "--config", "site.yaml"});
+  CHECK(another.exit_code == 3);  // another robot
+  CHECK(another.err.find("robot.calibration_file") != std::string::npos);
 }
 
 TEST_CASE("what a simulated controller cannot be", "[scenario]") {

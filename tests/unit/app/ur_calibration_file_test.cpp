@@ -1,59 +1,15 @@
 #include "app/config/ur_calibration_file.hpp"
 
-#include <fmt/format.h>
-
 #include <catch2/catch.hpp>
 #include <optional>
 
 #include "platform/core/random.hpp"
+#include "tests/support/ur_correction.hpp"
 
 namespace firstlook {
 using Catch::Matchers::Contains;
 
 namespace {
-
-Pose turn_z(double angle) { return Pose(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())); }
-Pose turn_x(double angle) { return Pose(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX())); }
-Pose shift(double x, double y, double z) { return Pose(Eigen::Translation3d(x, y, z)); }
-
-/// What the driver's calibration_correction makes of a controller's rows, by its description: each row in two halves,
-/// the frames of joints 2 and 3 moved along their axes until their d is 0, then a frame for each joint.
-class Correction {
- public:
-  explicit Correction(std::span<const DhRow> rows) {
-    for (const DhRow& row : rows) {
-      halves_.push_back(turn_z(row.theta_offset_rad) * shift(0, 0, row.d_m));
-      halves_.push_back(shift(row.a_m, 0, 0) * turn_x(row.alpha_rad));
-    }
-    for (const std::size_t joint : {1, 2}) move_along_axis(joint, rows[joint]);
-  }
-  [[nodiscard]] std::string yaml(const std::string& hash) const {
-    constexpr const char* kNames[] = {"shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"};
-    std::string text = "kinematics:\n";
-    for (std::size_t i = 0; i < 6; ++i) {
-      const Pose frame = i == 0 ? halves_[0] : halves_[2 * i - 1] * halves_[2 * i];
-      const Eigen::Vector3d t = frame.translation(), turn = frame.linear().eulerAngles(0, 1, 2);
-      text += fmt::format("  {}:\n    x: {}\n    y: {}\n    z: {}\n    roll: {}\n    pitch: {}\n    yaw: {}\n",
-                          kNames[i], t.x(), t.y(), t.z(), turn[0], turn[1], turn[2]);
-    }
-    return hash.empty() ? text : text + "  hash: " + hash + "\n";
-  }
-
- private:
-  void move_along_axis(std::size_t joint, const DhRow& row) {
-    if (row.d_m == 0) return;
-    const Pose next = halves_[2 * joint] * halves_[2 * joint + 1];
-    const Eigen::Vector3d axis = next.linear().col(2), at = next.translation();
-    const double along = -at.z() / axis.z();  // where the next axis crosses the plane of this joint's frame
-    const Eigen::Vector3d crossing = at + along * axis;
-    const double theta = std::atan(crossing.y() / crossing.x());
-    halves_[2 * joint] = turn_z(theta);
-    halves_[2 * joint + 1] =
-        shift(-crossing.norm(), 0, 0) * turn_z(row.theta_offset_rad - theta) * turn_x(row.alpha_rad);
-    halves_[2 * joint + 2] = shift(0, 0, -along) * halves_[2 * joint + 2];
-  }
-  std::vector<Pose> halves_;
-};
 
 /// A robot as a factory measures it: its second and third axes are not quite parallel, and frames lie far along them.
 ArmModel measured(const char* model, std::uint64_t seed) {
@@ -80,7 +36,7 @@ TEST_CASE("a file of calibration_correction puts the flange where the controller
   const std::string model = GENERATE("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e");
   const auto seed = GENERATE(range(1, 6));
   const ArmModel arm = measured(model.c_str(), static_cast<std::uint64_t>(seed));
-  const auto file = parse_ur_calibration(Correction(std::span(arm.dh).first(6)).yaml("calib_1"), "robot.yaml");
+  const auto file = parse_ur_calibration(test::UrCorrection(std::span(arm.dh).first(6)).yaml("calib_1"), "robot.yaml");
   REQUIRE(file);
   CHECK(file->hash == "calib_1");
   const ArmModel published = *find_arm_model(model);
@@ -96,7 +52,7 @@ TEST_CASE("a file of calibration_correction puts the flange where the controller
 
 TEST_CASE("the published kinematics as a file are the published arm", "[config]") {
   const ArmModel arm = *find_arm_model("ur10e");
-  const auto file = parse_ur_calibration(Correction(std::span(arm.dh).first(6)).yaml(""), "robot.yaml");
+  const auto file = parse_ur_calibration(test::UrCorrection(std::span(arm.dh).first(6)).yaml(""), "robot.yaml");
   REQUIRE(file);
   CHECK(file->hash.empty());
   CHECK(flange_difference(with_factory_frames(arm, file->frames).arm, arm).m < 1e-12);
@@ -107,7 +63,7 @@ TEST_CASE("rotations are put together as they were taken apart, not as a URDF's"
   ArmModel arm = measured("ur5", 3);
   arm.dh[1].theta_offset_rad = 0.1;
   arm.dh[1].alpha_rad = 0.08;
-  const auto file = parse_ur_calibration(Correction(std::span(arm.dh).first(6)).yaml(""), "robot.yaml");
+  const auto file = parse_ur_calibration(test::UrCorrection(std::span(arm.dh).first(6)).yaml(""), "robot.yaml");
   REQUIRE(file);
   CHECK(flange_difference(with_factory_frames(*find_arm_model("ur5"), file->frames).arm, arm).m < 1e-9);
 }
@@ -122,7 +78,7 @@ TEST_CASE("hashes are those that the driver writes", "[config]") {
 
 TEST_CASE("what is no such file is refused with its place", "[config]") {
   const ArmModel arm = measured("ur5", 1);
-  const std::string good = Correction(std::span(arm.dh).first(6)).yaml("");
+  const std::string good = test::UrCorrection(std::span(arm.dh).first(6)).yaml("");
   const auto refused = [](const std::string& text, const char* word) {
     const auto read = parse_ur_calibration(text, "robot.yaml");
     REQUIRE_FALSE(read);

@@ -1,6 +1,6 @@
 /// What a network, people, a loss of power and a controller's own faults do to a job, drawn from seeds: nothing moves
 /// that was not asked for, or after it was stopped, and a job that ends early can say why. FIRSTLOOK_FAULT_SEEDS names
-/// another number of seeds than 60, FIRSTLOOK_FAULT_FIRST another first one.
+/// another number of seeds than 200, FIRSTLOOK_FAULT_FIRST another first one.
 #include <algorithm>
 #include <cstdlib>
 #include <map>
@@ -254,7 +254,7 @@ class Trial {
 
 TEST_CASE("whatever happens on the way, nothing moves after a stop without a fresh command of a program that plays",
           "[ur]") {
-  const int seeds = number_of("FIRSTLOOK_FAULT_SEEDS", test::trials(60));
+  const int seeds = number_of("FIRSTLOOK_FAULT_SEEDS", test::trials(200));
   const int first = number_of("FIRSTLOOK_FAULT_FIRST", 1);
   Tally tally;
   for (int seed = first; seed < first + seeds; ++seed) {
