@@ -51,6 +51,12 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
       if (pipe.port == kControlPort) pipe.closed_by_us = pipe.closed_by_script = true;
     }
   }
+  /// The controller hangs up on all its clients; its program's connections stay.
+  void break_sessions() {
+    for (const Slot& slot : slots_) {
+      if (slot.session != nullptr) slot.session->cut_off();
+    }
+  }
   [[nodiscard]] int links_open() const {
     int count = 0;
     for (const Slot& slot : slots_) count += slot.kind != Slot::Kind::kFree;

@@ -102,7 +102,7 @@ class Trial {
   }
 
   void happen() {
-    const int what = random_.below(34);
+    const int what = random_.below(35);
     happened_ += fmt::format(" {}@{:.2f}", what, arm_.now().seconds());
     switch (what) {
       case 0:
@@ -165,6 +165,9 @@ class Trial {
         return;
       case 23:
         return run_another_version();
+      case 24:  // the controller hangs up on its clients, and its program does not
+        arm_.network.break_sessions();
+        return end();
       default:
         arm_.network.plug(true);
         make_ready();

@@ -288,6 +288,18 @@ TEST_CASE("a link that is lost is answered when it is closed, or after its silen
     REQUIRE((delays.react_s || delays.lost_s));
     CHECK(std::max(delays.react_s.value_or(0), delays.lost_s.value_or(0)) <= kTurnAndReport_s);
   }
+  SECTION("RTDE alone is closed: the program is told to stop in the next turn") {
+    const double before_rad_s = arm.ur.state().qd_rad_s[0];
+    arm.network.break_sessions();
+    static_cast<void>(obey(arm, 0.004 + 2 * 0.008));  // two turns, a cycle until it is read and one to begin
+    REQUIRE(arm.robot.delays().lost_s);
+    CHECK(*arm.robot.delays().lost_s <= kTurnAndReport_s);
+    CHECK(arm.ur.state().qd_rad_s[0] < before_rad_s - 0.01);
+    static_cast<void>(obey(arm, 0.5));
+    CHECK(playing.turned(1) < kStands_rad);
+    CHECK(arm.keys == std::vector{OperatorAction::kPlay});  // that it is there again is no press of Play
+    return;
+  }
   SECTION("the controller is switched off and on") {
     arm.ur.robot.reboot();
     const auto stopped = obey(arm, 0.5);
