@@ -101,6 +101,24 @@ std::string whole_job(const std::vector<std::string>& happens) {
 
 }  // namespace
 
+TEST_CASE("in lockstep what is to happen to the robot happens in the job's time, as in one process", "[scenario]") {
+  const JobFolder folder;
+  const std::string what = "20.3=system-emergency-stop";
+  const ProgramResult inside =
+      folder.run_job("inside", {"--only", "calibrate", "--robot", "simulated", "--robot-at", what});
+  CHECK(inside.exit_code == 6);
+  const UrSim robot({"--cell", "empty", "--seed", "1", "--lockstep", "--at", what});
+  folder.write("site.yaml", "robot: {port_offset: " + std::to_string(robot.offset) + "}\n");
+  const ProgramResult outside =
+      folder.run_job("outside", {"--only", "calibrate", "--robot", "127.0.0.1", "--config", "site.yaml"});
+  CHECK(outside.exit_code == 6);
+  const Json one = folder.read_json("inside/result.json"), other = folder.read_json("outside/result.json");
+  CHECK(one["reason"].get<std::string>().starts_with("E5004"));
+  CHECK(one["safety"] == other["safety"]);
+  CHECK(one["robot"] == other["robot"]);
+  CHECK(folder.run_job("wrong", {"--robot-at", what}).exit_code == 2);
+}
+
 TEST_CASE("whole jobs meet what can happen to a robot: done, or stopped with a reason", "[scenario]") {
   CHECK(whole_job({"40=pause", "220=play", "250=pause", "252=play"}) == "done");
   CHECK(whole_job({"35.3=protective-stop-paused"}) == "E5004");
