@@ -49,15 +49,21 @@ Pose frame_on_axis(const Vector3d& point, const Vector3d& z, const Pose& publish
 }  // namespace
 
 MeasuredArm with_factory_axes(const ArmModel& published, const std::array<DhRow, kJointsMax>& measured) {
-  MeasuredArm found{published};
   ArmModel told = published;
   told.dh = measured;
-  const JointVector zero = JointVector::zero(published.joints);
-  const LinkFrames there = forward(told, zero), here = forward(published, zero);
+  const LinkFrames there = forward(told, JointVector::zero(published.joints));
+  FactoryFrames frames;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(published.joints); ++i) frames[i] = there.base_T_link[i + 1];
+  return with_factory_frames(published, frames);
+}
+
+MeasuredArm with_factory_frames(const ArmModel& published, const FactoryFrames& measured) {
+  MeasuredArm found{published};
+  const LinkFrames here = forward(published, JointVector::zero(published.joints));
   Pose before = here.base_T_link[0];
   for (int j = 0; j < published.joints; ++j) {
     const auto i = static_cast<std::size_t>(j);
-    const Pose& own = there.base_T_link[i + 1];  // its z is the next joint's axis
+    const Pose& own = measured[i];  // its z is the next joint's axis
     const double theta_rad = published.dh[i].theta_offset_rad;
     const bool flange = j + 1 == published.joints;
     const Pose frame =

@@ -21,4 +21,9 @@ struct MeasuredArm {
 /// lost (Hayati and Mirmirani 1985). Of `published` all but the rows is kept.
 [[nodiscard]] MeasuredArm with_factory_axes(const ArmModel& published, const std::array<DhRow, kJointsMax>& measured);
 
+/// The same from frames in Base, all joints at 0: of each joint but the first one whose z is its axis, anywhere on it;
+/// the flange is the last. Axis 1 is that of `published`.
+using FactoryFrames = std::array<Pose, kJointsMax>;
+[[nodiscard]] MeasuredArm with_factory_frames(const ArmModel& published, const FactoryFrames& measured);
+
 }  // namespace firstlook

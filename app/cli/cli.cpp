@@ -100,6 +100,12 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                       "address of a Universal Robots controller that moves the arm (robot.host), at the pace of the "
                       "clock; what the cameras see of it is simulated: `firstlook ur-sim --cell ...` there, with "
                       "--lockstep in virtual time; simulated: such a controller in this process");
+  run_app
+      ->add_option(
+          "--robot-at", run.robot_happens,
+          "with --robot simulated: SECONDS=WHAT happens to the controller, such as 20=reboot; may be repeated; "
+          "`firstlook ur-sim --at help` tells what can")
+      ->allow_extra_args(false);
   run_app->add_flag("--record", run.record,
                     "keep the views of the board as a dataset that `firstlook calibrate` reads");
   run_app->add_flag("--resume", run.resume,
@@ -216,7 +222,8 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   ur_sim_app->add_option("--host", ur_sim.host, "address to listen on; 0.0.0.0: every one of this computer")
       ->capture_default_str();
   ur_sim_app
-      ->add_option("--port-offset", ur_sim.port_offset, "added to the ports 29999, 30001 to 30004, 30011 to 30013")
+      ->add_option("--port-offset", ur_sim.port_offset,
+                   "added to the ports 29999, 30001 to 30004, 30011 to 30013, 30098")
       ->check(CLI::Range(-29000, 35500))
       ->capture_default_str();
   ur_sim_app->add_option("--seed", ur_sim.seed, "draws the arm's factory correction; 0: the published kinematics")
@@ -244,7 +251,14 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                  "with --cell: the robot's time is the virtual one of `firstlook run --robot`, so that a run of two "
                  "processes gives the same bytes as one with `--robot simulated`")
       ->needs(ur_sim_app->get_option("--cell"));
-
+  ur_sim_app
+      ->add_option(
+          "--at", ur_sim.happens,
+          "SECONDS=WHAT: what happens to the robot so long after the start, in the job's time with --lockstep, "
+          "such as 20=emergency-stop; may be repeated; help: what can happen")
+      ->allow_extra_args(false);
+  ur_sim_app->add_flag("--console", ur_sim.console,
+                       "what happens to the robot by lines on stdin, as always by lines to the port 30098");
   UrScriptCommand ur_script;
   CLI::App* ur_script_app =
       app.add_subcommand("ur-script", "the robot's program as a file, for pendants without the External Control URCap");

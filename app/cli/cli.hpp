@@ -30,6 +30,7 @@ struct RunCommand {
   bool resume = false;
   std::string out;  ///< empty: runs/<date>-<seed>
   std::string faults;
+  std::vector<std::string> robot_happens;  ///< "SECONDS=WHAT" of a controller in this process, as UrSimCommand's
 };
 struct UrScriptCommand {
   std::string host;  ///< of this computer, as the controller sees it
@@ -59,6 +60,8 @@ struct UrSimCommand {
   std::string cell;                   ///< where the arm stands; its true joints are told to the cell's cameras
   double play_after_s = -1;           ///< somebody presses Play; below 0: nobody
   bool lockstep = false;              ///< its time is that of `firstlook run --robot`
+  std::vector<std::string> happens;   ///< "SECONDS=WHAT", as read_timed_happening reads them
+  bool console = false;
 };
 
 using Command = std::variant<RunCommand, CalibrateCommandOptions, MapCommandOptions, ExportCommandOptions,

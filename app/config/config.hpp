@@ -33,13 +33,15 @@ struct Config {
     bool operator==(const Arm&) const = default;
   } arm;
 
-  struct Robot {                       ///< a Universal Robots controller on the network
-    std::string host = "none";         ///< name or address; none: the arm of the simulated cell
-    std::string own_address = "auto";  ///< this computer's, as the controller sees it
-    int program_port = 50002;          ///< where the External Control URCap asks for our program
-    int control_port = 50001;          ///< where that program asks for commands
-    int port_offset = 0;               ///< added to the controller's ports
-    double payload_kg = -1;            ///< that the controller must have set; below 0: whatever it has
+  struct Robot {                            ///< a Universal Robots controller on the network
+    std::string host = "none";              ///< name or address; none: the arm of the simulated cell
+    std::string own_address = "auto";       ///< this computer's, as the controller sees it
+    int program_port = 50002;               ///< where the External Control URCap asks for our program
+    int control_port = 50001;               ///< where that program asks for commands
+    int port_offset = 0;                    ///< added to the controller's ports
+    double payload_kg = -1;                 ///< that the controller must have set; below 0: whatever it has
+    std::optional<JointVector> tcp_offset;  ///< that it must have set: m, and a rotation vector in rad; empty: any
+    std::string calibration_file = "none";  ///< of ur_calibration: the factory correction, compared with its own
     bool operator==(const Robot&) const = default;
     [[nodiscard]] bool given() const { return host != "none"; }
   } robot;

@@ -96,6 +96,22 @@ void add_robot_keys(Keys& keys, Config& c) {
                   100,
                   {},
                   "that must be set in the controller, else the job is refused; -1: whatever is set there"});
+  keys.push_back(
+      {"robot.tcp_offset",
+       &c.robot.tcp_offset,
+       -6.2832,
+       6.2832,
+       {},
+       "TCP that must be set in the controller, else the job is refused: [x, y, z, rx, ry, rz] as the pendant "
+       "shows it, in m and rad; null: whatever is set there (firstlook moves joints and uses none)"});
+  keys.push_back(
+      {"robot.calibration_file",
+       &c.robot.calibration_file,
+       0,
+       0,
+       {},
+       "YAML that calibration_correction (ROS: ur_calibration) wrote for this robot: its factory correction, "
+       "refused where the controller tells another; none: what the controller tells"});
 }
 
 void add_space_keys(Keys& keys, Config& c) {
@@ -532,6 +548,12 @@ std::string broken_rule(const Config& c) {
   }
   if (c.calibration.touch_tip == "estimate" && c.calibration.touch_corners < 4) {
     return "calibration.touch_corners must be 4 at least when the tip is estimated";
+  }
+  if (c.robot.tcp_offset && c.robot.tcp_offset->size() != 6) {
+    return "robot.tcp_offset must be null or six numbers: [x, y, z, rx, ry, rz] in m and rad";
+  }
+  if (!c.robot.given() && c.robot.calibration_file != "none") {
+    return "robot.calibration_file needs robot.host: the arm of a simulated cell has the published kinematics";
   }
   if (c.robot.program_port == c.robot.control_port) return "robot.program_port and robot.control_port must differ";
   if (const auto targets = targets_of(c); !targets) return std::string(targets.error().detail());

@@ -31,8 +31,19 @@ std::string provenance_section(const RunRecord& record) {
     std::string sums;
     for (const std::uint32_t sum : robot.kinematics_checksums) sums += fmt::format("{:08x} ", sum);
     table.row({"its kinematics as measured in the factory, checksums", sums});
+    table.row({"the same as ROS's ur_calibration names them", robot.calibration_hash});
+    if (robot.calibration_file) {
+      const RobotRecord::CalibrationFile& file = *robot.calibration_file;
+      table.row(
+          {"taken from", fmt::format("{}: {}; the flange is where the controller has it, within {:.4f} mm", file.path,
+                                     file.hash_agrees ? "the same hash" : "another hash", 1e3 * file.flange_off_m)});
+    }
     table.row({"longest from its program's connection to consent, from command to motion, from stop to standstill",
                fmt::format("{:.3f}, {:.3f}, {:.3f} s", robot.consent_s, robot.accept_s, robot.stop_s)});
+    const auto longest = [](const std::optional<double>& s) { return s ? fmt::format("{:.3f} s", *s) : "none"; };
+    table.row({"longest from a stop or pause of the controller to the command to stop, while a segment was under way",
+               longest(robot.react_s)});
+    table.row({"the same from the last sign of a lost link", longest(robot.lost_s)});
   }
   table.row({"cell", record.cell});
   table.row({"seed", fmt::format("{}", record.seed)});

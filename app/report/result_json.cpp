@@ -88,13 +88,23 @@ Json robot_json(const RobotRecord& robot) {
                     {"beta_rad", row.beta_rad},
                     {"gamma_rad", row.gamma_rad}});
   }
+  Json file(nullptr);
+  if (robot.calibration_file) {
+    file = {{"path", robot.calibration_file->path},
+            {"hash", robot.calibration_file->hash},
+            {"hash_agrees", robot.calibration_file->hash_agrees},
+            {"flange_off_m", robot.calibration_file->flange_off_m}};
+  }
   return {{"model", robot.model},
           {"software", robot.software},
           {"serial", robot.serial.empty() ? Json(nullptr) : Json(robot.serial)},
-          {"kinematics", {{"checksums", checksums}, {"dh", rows}}},
+          {"kinematics",
+           {{"checksums", checksums}, {"ur_calibration_hash", robot.calibration_hash}, {"file", file}, {"dh", rows}}},
           {"play_to_consent_s", robot.consent_s},
           {"segment_begins_within_s", robot.accept_s},
           {"stop_stands_within_s", robot.stop_s},
+          {"stop_answered_within_s", or_null(robot.react_s)},
+          {"link_loss_answered_within_s", or_null(robot.lost_s)},
           {"joint_reports", robot.reports},
           {"streams_broken", robot.broken}};
 }

@@ -270,10 +270,22 @@ struct RobotRecord {
   std::string software;  ///< "3.15.8"
   std::string serial;    ///< empty: the controller is too old to tell
   std::array<std::uint32_t, 6> kinematics_checksums{};
+  std::string calibration_hash;  ///< of these kinematics, as ROS's ur_calibration writes it
+  /// `robot.calibration_file`, where the arm model comes from it.
+  struct CalibrationFile {
+    std::string path;
+    std::string hash;          ///< that stands in it; empty: none
+    bool hash_agrees = false;  ///< with the controller's
+    double flange_off_m = 0;   ///< the largest difference to the controller's kinematics
+  };
+  std::optional<CalibrationFile> calibration_file;
   std::array<DhRow, 6> dh{};  ///< with the factory's correction: the arm model of the run
   double consent_s = 0;       ///< the longest from the program's connection until it could be moved
   double accept_s = 0;        ///< and from a segment's command until the program had begun it
   double stop_s = 0;          ///< and from a command to stop until the arm stood
+  /// And from a stop or pause of the controller, or from the last report of a lost link, until the segment that was
+  /// under way was withdrawn; empty: that did not happen.
+  std::optional<double> react_s, lost_s;
   std::uint64_t reports = 0;  ///< of the joints
   std::uint64_t broken = 0;   ///< streams of reports that were given up
 };

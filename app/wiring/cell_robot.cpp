@@ -9,6 +9,17 @@ namespace {
 
 constexpr const char* kOwnHost = "127.0.0.1";
 
+/// What happens to a controller in this process: the faults of the cell that its arm has, and what was asked for.
+Result<sim::ur::Timetable> timetable_of(const RunCommand& command, const sim::Faults& faults) {
+  sim::ur::Timetable timetable = sim::ur::timetable_of(sim::controller_script(faults));
+  for (const std::string& words : command.robot_happens) {
+    const auto happening = sim::ur::read_timed_happening(words);
+    if (!happening) return failure(happening.error().fault, "--robot-at {}", happening.error().detail());
+    timetable.push_back(*happening);
+  }
+  return timetable;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, const Config& config) {
@@ -16,17 +27,22 @@ Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, co
   if (config.calibration.touch_test == "yes") {
     return failure(Fault::kUsage, "calibration.touch_test: the simulated person leads the cell's own arm only");
   }
+  if (!command.robot_happens.empty() && config.robot.host != kInProcess) {
+    return failure(Fault::kUsage, "--robot-at is for --robot {}: `ur-sim` has --at of its own", kInProcess);
+  }
   const memory::SimulationScope simulation;
   const auto faults = sim::parse_faults(command.faults);
   if (!faults) return std::unexpected(faults.error());
   std::unique_ptr<CellRobot> robot(new CellRobot);
-  const Status found = config.robot.host == kInProcess ? robot->start_in_process(*faults, config)
+  auto timetable = timetable_of(command, *faults);
+  if (!timetable) return std::unexpected(timetable.error());
+  const Status found = config.robot.host == kInProcess ? robot->start_in_process(std::move(*timetable), config)
                                                        : robot->find_on_network(*faults, config);
   if (!found) return std::unexpected(found.error());
   return robot;
 }
 
-Status CellRobot::start_in_process(const sim::Faults& faults, const Config& config) {
+Status CellRobot::start_in_process(sim::ur::Timetable timetable, const Config& config) {
   UrSimCommand words;
   words.cell = config.cell;
   words.seed = static_cast<std::uint64_t>(config.seed);
@@ -35,7 +51,7 @@ Status CellRobot::start_in_process(const sim::Faults& faults, const Config& conf
   auto controller = make_simulated_ur(words);
   if (!controller) return std::unexpected(controller.error());
   controller_ = std::move(*controller);
-  service_ = std::make_unique<sim::ur::SteppedService>(*controller_, sim::controller_script(faults));
+  service_ = std::make_unique<sim::ur::SteppedService>(*controller_, std::move(timetable));
   links_ = std::make_unique<sim::ur::SteppedLinks>(
       [this](std::string_view asked, std::string& told) { return service_->turn(asked, told); });
   return follow_steps();

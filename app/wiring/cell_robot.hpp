@@ -34,7 +34,7 @@ class CellRobot {
 
  private:
   CellRobot() = default;
-  [[nodiscard]] Status start_in_process(const sim::Faults& faults, const Config& config);
+  [[nodiscard]] Status start_in_process(sim::ur::Timetable timetable, const Config& config);
   [[nodiscard]] Status find_on_network(const sim::Faults& faults, const Config& config);
   [[nodiscard]] Status follow_steps();
 

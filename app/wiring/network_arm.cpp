@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "algorithms/kinematics/factory_kinematics.hpp"
+#include "app/config/ur_calibration_file.hpp"
 #include "hal/ur/modes.hpp"
 #include "hal/ur/tcp_network.hpp"
 
@@ -64,15 +65,41 @@ Result<std::unique_ptr<NetworkArm>> NetworkArm::connect(const Config& config, Na
   options.host = config.robot.host;
   options.robot = {config.arm.model, own_host, static_cast<std::uint16_t>(config.robot.control_port)};
   options.payload_kg = config.robot.payload_kg;
+  options.upright = config.arm.mounting == "upright";
+  options.pendant_starts = config.start_source == "pendant";
+  if (config.robot.tcp_offset) {
+    auto& tcp = options.tcp_offset.emplace();
+    for (std::size_t i = 0; i < tcp.size(); ++i) tcp[i] = (*config.robot.tcp_offset)[static_cast<int>(i)];
+  }
   auto connected = ur::NetworkRobot::connect(*arm->network_, clock, options, arm->notices_.get());
   if (!connected) return std::unexpected(connected.error());
   arm->robot_ = std::move(*connected);
   const ur::RobotIdentity& identity = arm->robot_->identity();
-  auto measured = measure(identity, config);
+  auto measured = arm->measure(identity, config);
   if (!measured) return std::unexpected(measured.error());
   arm->model_ = *measured;
-  narrator.line(fmt::format("robot     {} at {}, serial number {}, kinematics as its factory measured them",
-                            config.arm.model, config.robot.host, identity.serial_number()));
+  narrator.line(fmt::format("robot     {} at {}, serial number {}, kinematics as its factory measured them{}",
+                            config.arm.model, config.robot.host, identity.serial_number(),
+                            arm->file_ ? fmt::format(", from {}, as the controller has them", arm->file_->path) : ""));
+  return arm;
+}
+
+/// The file's kinematics, where they are the controller's.
+Result<ArmModel> NetworkArm::read_file(const std::string& path, const ArmModel& published, const ArmModel& told) {
+  // Files have 16 digits; this is a thousandth of what a correction corrects.
+  constexpr double kSame_m = 2e-5, kSame_rad = 2e-5;
+  const auto file = read_ur_calibration(path);
+  if (!file) return failure(file.error().fault, "robot.calibration_file: {}", file.error().detail());
+  ArmModel arm = with_factory_frames(published, file->frames).arm;
+  const FlangeDifference off = flange_difference(arm, told);
+  if (off.m > kSame_m || off.rad > kSame_rad) {
+    return failure(
+        Fault::kConfigBadValue,
+        "robot.calibration_file {:.60}: of another robot ({}, here {}): the flange would be off by {:.2f} mm, "
+        "{:.2f} mrad. Have calibration_correction write it anew, or set none",
+        path, file->hash.empty() ? "no hash" : file->hash, hash_, 1e3 * off.m, 1e3 * off.rad);
+  }
+  file_ = RobotRecord::CalibrationFile{path, file->hash, file->hash == hash_, off.m};
   return arm;
 }
 
@@ -92,7 +119,9 @@ Result<ArmModel> NetworkArm::measure(const ur::RobotIdentity& robot, const Confi
                    config.robot.host, published.name.view(), 1e3 * measured.frames_off_m,
                    1e3 * measured.frames_off_rad);
   }
-  return measured.arm;
+  hash_ = ur_calibration_hash(std::span(told).first<6>());
+  if (config.robot.calibration_file == "none") return measured.arm;
+  return read_file(config.robot.calibration_file, published, measured.arm);
 }
 
 hal::DeviceReport NetworkArm::report(Instant) const {
@@ -125,10 +154,14 @@ RobotRecord NetworkArm::record(Narrator& narrator) const {
   record.software = fmt::format("{}.{}.{}", identity.version.major, identity.version.minor, identity.version.bugfix);
   record.serial = identity.serial_number();
   record.kinematics_checksums = identity.kinematics.checksums;
+  record.calibration_hash = hash_;
+  record.calibration_file = file_;
   std::copy_n(model_.dh.begin(), record.dh.size(), record.dh.begin());
   record.consent_s = delays.consent_s;
   record.accept_s = delays.accept_s;
   record.stop_s = delays.stop_s;
+  record.react_s = delays.react_s;
+  record.lost_s = delays.lost_s;
   record.reports = robot_->robot().rtde().counters().reports;
   record.broken = robot_->robot().rtde().counters().broken;
   narrator.line(

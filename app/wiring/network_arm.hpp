@@ -20,7 +20,7 @@ class NetworkArm final : public hal::ReportingDevice {
  public:
   /// Connects to `config.robot.host` by TCP, identifies it and says so. Errors: those of ur::NetworkRobot::connect,
   /// kDeviceMissing for ports of ours that are taken, and kConfigBadValue for kinematics that are not those of the
-  /// configured model.
+  /// configured model, or for a `robot.calibration_file` that is another robot's or none.
   [[nodiscard]] static Result<std::unique_ptr<NetworkArm>> connect(const Config& config, Narrator& narrator);
   /// The same on another network, with its clock until the job begins.
   /// @param own_host  this computer as the controller sees it
@@ -41,13 +41,16 @@ class NetworkArm final : public hal::ReportingDevice {
  private:
   class Notices;
   NetworkArm();
-  [[nodiscard]] static Result<ArmModel> measure(const ur::RobotIdentity& robot, const Config& config);
+  [[nodiscard]] Result<ArmModel> measure(const ur::RobotIdentity& robot, const Config& config);
+  [[nodiscard]] Result<ArmModel> read_file(const std::string& path, const ArmModel& published, const ArmModel& told);
 
   std::unique_ptr<Notices> notices_;
   std::unique_ptr<ur::Network> network_;
   std::unique_ptr<ur::NetworkRobot> robot_;
   ArmModel model_;
   std::string host_;
+  std::string hash_;  ///< of the controller's kinematics, as ur_calibration_hash
+  std::optional<RobotRecord::CalibrationFile> file_;
 };
 
 }  // namespace firstlook

@@ -54,6 +54,9 @@ Result<ArmModel> read_arm(const std::string& path, const Config::Arm& config, Na
 
 Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, Config& config, Narrator& narrator) {
   std::unique_ptr<CellRobot> robot;
+  if (!config.robot.given() && !command.robot_happens.empty()) {
+    return failure(Fault::kUsage, "--robot-at is for --robot {}", CellRobot::kInProcess);
+  }
   if (config.robot.given()) {
     auto found = CellRobot::find(command, config);
     if (!found) return std::unexpected(found.error());

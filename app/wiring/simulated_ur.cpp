@@ -1,5 +1,6 @@
 #include "app/wiring/simulated_ur.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
@@ -36,6 +37,7 @@ Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimComma
     if (!scene) return std::unexpected(scene.error());
     model = scene->arm.name.view();
     options.start_rad = scene->start_rad;
+    options.remote_control = false;  // somebody stands at its pendant
   }
   const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);
   if (!identity && !command.cell.empty())
@@ -59,13 +61,23 @@ Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimComma
 }
 
 int run_ur_sim(const UrSimCommand& command) {
+  if (std::ranges::find(command.happens, "help") != command.happens.end()) {
+    std::printf("%s", sim::ur::happenings_in_words().c_str());
+    return kExitDone;
+  }
   const auto robot = make_simulated_ur(command);
   if (!robot) return fail(robot.error());
   constexpr double kPlay_s = 0.5;  // as the operator of a simulated cell
   const double play_after_s = command.lockstep && command.play_after_s < 0 ? kPlay_s : command.play_after_s;
+  sim::ur::Timetable timetable;
+  for (const std::string& words : command.happens) {
+    const auto happening = sim::ur::read_timed_happening(words);
+    if (!happening) return fail(failure(happening.error().fault, "--at {}", happening.error().detail()).error());
+    timetable.push_back(*happening);
+  }
   catch_stop_signals();
-  const Status served = sim::ur::serve_on_tcp(
-      **robot, {command.host, command.port_offset, !command.cell.empty(), play_after_s, command.lockstep});
+  const Status served = sim::ur::serve_on_tcp(**robot, {command.host, command.port_offset, !command.cell.empty(),
+                                                        play_after_s, command.lockstep, timetable, command.console});
   if (served) return kExitDone;
   std::fprintf(
       stderr,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "hal/ur/modes.hpp"
 
@@ -71,6 +72,7 @@ std::optional<Result<RobotIdentity>> Identification::poll(Instant now) {
     robot.robot_mode = *state_.robot_mode;
     robot.safety_mode = *state_.safety_mode;
     robot.tcp_offset = *state_.tcp_offset;
+    robot.remote_control = dashboard_.answer(DashboardClient::Question::kRemote) == "true";
     return Result<RobotIdentity>(robot);
   }
   const bool closed = network_.state(link_) == LinkState::kClosed;
@@ -82,6 +84,38 @@ std::optional<Result<RobotIdentity>> Identification::poll(Instant now) {
   }
   return std::nullopt;
 }
+
+namespace {
+
+/// A rotation vector as a quaternion's vector and scalar part.
+std::array<double, 4> quaternion_of(std::span<const double, 3> turn_rad) {
+  const double angle = std::hypot(turn_rad[0], turn_rad[1], turn_rad[2]);
+  const double scale = angle > 1e-12 ? std::sin(angle / 2) / angle : 0.5;
+  return {scale * turn_rad[0], scale * turn_rad[1], scale * turn_rad[2], std::cos(angle / 2)};
+}
+
+double angle_between(std::span<const double, 3> one_rad, std::span<const double, 3> other_rad) {
+  const auto a = quaternion_of(one_rad), b = quaternion_of(other_rad);
+  double dot = 0;
+  for (std::size_t i = 0; i < 4; ++i) dot += a[i] * b[i];
+  return 2 * std::acos(std::min(1.0, std::abs(dot)));
+}
+
+Status check_tcp(const std::array<double, 6>& set, const std::array<double, 6>& expected) {
+  // Half of the last digit that the pendant shows, some times over.
+  constexpr double kSame_m = 1e-4, kSame_rad = 1e-3;
+  const std::span<const double, 6> one(set), other(expected);
+  const double off_m = std::hypot(set[0] - expected[0], set[1] - expected[1], set[2] - expected[2]);
+  const double off_rad = angle_between(one.subspan<3, 3>(), other.subspan<3, 3>());
+  if (off_m <= kSame_m && off_rad <= kSame_rad) return {};
+  return failure(
+      Fault::kConfigBadValue,
+      "robot.tcp_offset: the controller's TCP is [{:.4f}, {:.4f}, {:.4f}, {:.3f}, {:.3f}, {:.3f}], {:.1f} mm "
+      "and {:.3f} rad off: set it in Installation, TCP, or correct the configuration",
+      set[0], set[1], set[2], set[3], set[4], set[5], 1e3 * off_m, off_rad);
+}
+
+}  // namespace
 
 Status check_robot(const RobotIdentity& robot, const ExpectedRobot& expected) {
   const ControllerVersion& v = robot.version;
@@ -109,6 +143,13 @@ Status check_robot(const RobotIdentity& robot, const ExpectedRobot& expected) {
       }
     }
   }
+  if (expected.pendant_starts && robot.remote_control) {
+    return failure(
+        Fault::kConfigBadValue,
+        "the robot is in remote control, where Play is pressed by the network and by no person: switch it to "
+        "local control on the pendant, or set start_source: panel");
+  }
+  if (expected.tcp_offset) return check_tcp(robot.tcp_offset, *expected.tcp_offset);
   return {};
 }
 

@@ -20,6 +20,7 @@ struct RobotIdentity {
   int robot_mode = -1;
   int safety_mode = 0;
   std::array<double, 6> tcp_offset{};
+  bool remote_control = false;  ///< programs are started by the network, not by a person at the pendant; e-Series only
 
   [[nodiscard]] std::string_view arm_name() const { return arm.data(); }
   [[nodiscard]] std::string_view serial_number() const { return serial.data(); }
@@ -56,9 +57,13 @@ class Identification {
 /// What the configuration says of the robot.
 struct ExpectedRobot {
   std::string_view arm;  ///< as ArmModel names it
+  /// The TCP that must be set: m, and a rotation vector in rad; empty: any.
+  std::optional<std::array<double, 6>> tcp_offset{};
+  bool pendant_starts = false;  ///< a person's Play on the pendant is the only consent (start_source: pendant)
 };
-/// Refuses a robot that is not as configured, or must not be moved as it is. Errors: kConfigBadValue for another model,
-/// kProtectiveStop for a safety mode in which nothing may move, kDeviceMissing for software that is too old.
+/// Refuses a robot that is not as configured, or must not be moved as it is. Errors: kConfigBadValue for another model
+/// or TCP, or for remote control where a person is to press Play, kProtectiveStop for a safety mode in which nothing
+/// may move, kDeviceMissing for software that is too old.
 [[nodiscard]] Status check_robot(const RobotIdentity& robot, const ExpectedRobot& expected);
 
 }  // namespace firstlook::ur

@@ -1,5 +1,6 @@
 #include "hal/ur/network_robot.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace firstlook::ur {
@@ -51,16 +52,33 @@ Status check_payload(const RtdeReport& report, double expected_kg) {
                  *report.payload_kg);
 }
 
+Status check_mounting(const RtdeReport& report, bool upright) {
+  constexpr double kUpright_rad = 0.05;  // a person sets it by quarter turns, or to a degree
+  if (!report.gravity_m_s2) return {};
+  const auto& g = *report.gravity_m_s2;
+  const double size = std::hypot(g[0], g[1], g[2]);
+  if (!(size > 1)) return {};  // nobody has told the controller
+  const double off_rad = std::acos(std::clamp(g[2] / size, -1.0, 1.0));
+  if ((off_rad <= kUpright_rad) == upright) return {};
+  return failure(Fault::kConfigBadValue,
+                 "arm.mounting is {}, the controller's installation has its base {:.0f} degrees from upright: correct "
+                 "Installation, Mounting on the pendant, or arm.mounting",
+                 upright ? "upright" : "tilted", 180 / M_PI * off_rad);
+}
+
 Result<std::unique_ptr<NetworkRobot>> NetworkRobot::connect(Network& network, Clock& clock,
                                                             const NetworkRobotOptions& options, NoticeSink* notices) {
   std::unique_ptr<NetworkRobot> made(new NetworkRobot);
   const auto identity = identify(network, clock);
   if (!identity) return at_host(options, identity.error());
   made->identity_ = *identity;
-  if (const Status fit = check_robot(*identity, {options.robot.model}); !fit) return at_host(options, fit.error());
+  if (const Status fit = check_robot(*identity, {options.robot.model, options.tcp_offset, options.pendant_starts});
+      !fit)
+    return at_host(options, fit.error());
   const auto report = first_report(network, clock);
   if (!report) return at_host(options, report.error());
   if (const Status fit = check_payload(*report, options.payload_kg); !fit) return at_host(options, fit.error());
+  if (const Status fit = check_mounting(*report, options.upright); !fit) return at_host(options, fit.error());
   made->robot_ = std::make_unique<UrRobot>(network, options.robot, notices);
   return made;
 }

@@ -11,16 +11,19 @@
 namespace firstlook::ur {
 
 struct NetworkRobotOptions {
-  std::string host;        ///< of the controller, as errors name it
-  UrRobotOptions robot{};  ///< another model than this is refused
-  double payload_kg = -1;  ///< that the controller must have set; below 0: any
+  std::string host;                                   ///< of the controller, as errors name it
+  UrRobotOptions robot{};                             ///< another model than this is refused
+  double payload_kg = -1;                             ///< that the controller must have set; below 0: any
+  std::optional<std::array<double, 6>> tcp_offset{};  ///< the same, as ExpectedRobot has it; empty: any
+  bool pendant_starts = false;                        ///< as ExpectedRobot has it
+  bool upright = true;  ///< axis 1 stands plumb, the base below; the controller's mounting must say the same
 };
 
 class NetworkRobot {
  public:
   /// Takes some seconds of the clock at most. Errors: kDeviceMissing: no controller, or software that does not tell
-  /// what is needed; kConfigBadValue: another robot or payload than configured; kProtectiveStop: a safety mode in which
-  /// nothing may move.
+  /// what is needed; kConfigBadValue: another robot, TCP, payload or mounting than configured; kProtectiveStop: a
+  /// safety mode in which nothing may move.
   /// @param network  outlives the robot
   /// @param notices  may be null; outlives the robot
   [[nodiscard]] static Result<std::unique_ptr<NetworkRobot>> connect(Network& network, Clock& clock,
@@ -37,5 +40,8 @@ class NetworkRobot {
 
 /// Refuses another payload than expected (kg; below 0: any), and one that an older controller does not tell.
 [[nodiscard]] Status check_payload(const RtdeReport& report, double expected_kg);
+
+/// Refuses a mounting in the controller's installation that is not the configured one. A CB3 does not tell its own.
+[[nodiscard]] Status check_mounting(const RtdeReport& report, bool upright);
 
 }  // namespace firstlook::ur

@@ -11,10 +11,18 @@ constexpr std::string_view kNames =
     "timestamp,actual_q,actual_qd,robot_mode,safety_mode,runtime_state,speed_scaling,target_speed_fraction";
 constexpr std::string_view kNamesWithPayload =
     "timestamp,actual_q,actual_qd,robot_mode,safety_mode,runtime_state,speed_scaling,target_speed_fraction,payload";
+constexpr std::string_view kNamesWithGravity =
+    "timestamp,actual_q,actual_qd,robot_mode,safety_mode,runtime_state,speed_scaling,target_speed_fraction,payload,"
+    "target_gravity";
 constexpr std::size_t kFields = 8;
 constexpr RtdeType kTypes[kFields] = {RtdeType::kDouble, RtdeType::kVector6d, RtdeType::kVector6d, RtdeType::kInt32,
                                       RtdeType::kInt32,  RtdeType::kUint32,   RtdeType::kDouble,   RtdeType::kDouble};
-constexpr std::size_t kValues = 19, kPayloadAt = 18;
+constexpr std::size_t kValues = 22, kPayloadAt = 18, kGravityAt = 19;
+
+std::string_view names_of(int extras) {
+  constexpr std::string_view kAll[] = {kNames, kNamesWithPayload, kNamesWithGravity};
+  return kAll[extras];
+}
 
 int whole(double value) { return std::isfinite(value) ? static_cast<int>(std::clamp(value, -1e6, 1e6)) : -1; }
 
@@ -49,8 +57,7 @@ void RtdeClient::wait_for_answer(Instant now, Step step, const RtdeRequest& requ
 }
 
 void RtdeClient::ask_outputs(Instant now) {
-  wait_for_answer(now, Step::kOutputs,
-                  rtde_outputs_request(protocol_, frequency_hz_, with_payload_ ? kNamesWithPayload : kNames));
+  wait_for_answer(now, Step::kOutputs, rtde_outputs_request(protocol_, frequency_hz_, names_of(extras_)));
 }
 
 std::optional<RtdeReport> RtdeClient::poll(Instant now) {
@@ -158,10 +165,10 @@ Status RtdeClient::take_answer(Instant now, const RtdePackage& package) {
 }
 
 Status RtdeClient::take_outputs(Instant now, std::string_view payload) {
-  const auto recipe = rtde_recipe(protocol_, payload, with_payload_ ? kNamesWithPayload : kNames);
+  const auto recipe = rtde_recipe(protocol_, payload, names_of(extras_));
   if (!recipe) return std::unexpected(recipe.error());
-  if (!recipe->complete() && with_payload_) {  // an older controller
-    with_payload_ = false;
+  if (!recipe->complete() && extras_ > 0) {  // an older controller
+    --extras_;
     ask_outputs(now);
     return {};
   }
@@ -169,7 +176,9 @@ Status RtdeClient::take_outputs(Instant now, std::string_view payload) {
     return failure(Fault::kLinkLost, "RTDE: the controller does not have all of: {}", kNames);
   }
   const bool types_right = std::equal(std::begin(kTypes), std::end(kTypes), recipe->types.begin());
-  if (!types_right || (with_payload_ && recipe->types.back() != RtdeType::kDouble)) {
+  const bool payload_right = extras_ < 1 || recipe->types[kFields] == RtdeType::kDouble;
+  const bool gravity_right = extras_ < 2 || recipe->types[kFields + 1] == RtdeType::kVector3d;
+  if (!types_right || !payload_right || !gravity_right) {
     return failure(Fault::kLinkLost, "RTDE: outputs of other types than UR's guide has them");
   }
   recipe_ = *recipe;
@@ -190,7 +199,8 @@ RtdeReport RtdeClient::report_of(std::span<const double> values) const {
   if (runtime >= 0 && runtime < static_cast<int>(Runtime::kUnknown)) report.runtime = static_cast<Runtime>(runtime);
   report.speed_scaling = values[16];
   report.slider = values[17];
-  if (with_payload_) report.payload_kg = values[kPayloadAt];
+  if (extras_ >= 1) report.payload_kg = values[kPayloadAt];
+  if (extras_ >= 2) report.gravity_m_s2 = {values[kGravityAt], values[kGravityAt + 1], values[kGravityAt + 2]};
   return report;
 }
 

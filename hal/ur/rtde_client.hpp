@@ -23,6 +23,8 @@ struct RtdeReport {
   double speed_scaling = 0;            ///< how fast the program's motion runs, 0 to 1
   double slider = 0;                   ///< what the pendant's slider asks for, 0 to 1
   std::optional<double> payload_kg{};  ///< from 3.11 and 5.5 on
+  /// What holds the base up against gravity, in Base (m/s²), as the installation's mounting has it; e-Series only.
+  std::optional<std::array<double, 3>> gravity_m_s2{};
 };
 
 struct RtdeCounters {
@@ -74,7 +76,7 @@ class RtdeClient {
   Instant until_{};  ///< the step's limit
   Duration redial_ = kRedial;
   int protocol_ = 2;
-  bool with_payload_ = true;
+  int extras_ = 2;  ///< outputs that not all controllers have: 2 payload and gravity, 1 payload, 0 none
   RtdeRecipe recipe_;
   Inbox<8192> inbox_;
   std::array<std::uint32_t, 4> version_{};

@@ -94,8 +94,9 @@ void UrRobot::hear_program(Instant now) {
     moved_ = false;
     was_up_ = true;
     flight_ = Flight::kNone;
-    withdrawn_ = false;
+    withdrawn_ = cut_short_ = false;
     cut_.reset();
+    cause_.reset();
   }
   while (const auto report = program_.take()) {
     switch (report->kind) {
@@ -132,6 +133,7 @@ void UrRobot::hear_program(Instant now) {
 void UrRobot::note_end_of_program(Instant now) {
   if (!was_up_ || program_.up()) return;
   was_up_ = false;
+  cut_short_ = flight_ == Flight::kSent || flight_ == Flight::kMoving;
   if (flight_ != Flight::kNone) flight_ = Flight::kArriving;
   standing_reports_ = 0;
   cut_ = now;
@@ -139,7 +141,7 @@ void UrRobot::note_end_of_program(Instant now) {
 
 void UrRobot::follow_program(Instant now) {
   if (!program_.up()) return;
-  if (flight_ != Flight::kNone && flight_ != Flight::kArriving && flight_ != Flight::kStopping && stale(now)) {
+  if (flight_ != Flight::kNone && flight_ != Flight::kArriving && flight_ != Flight::kStopping && lost(now)) {
     command_stop(now);
   }
   // A program that does not answer is one that nobody commands: without us it stops the arm and ends.
@@ -159,7 +161,32 @@ void UrRobot::stay(Instant now) {
   program_.send(plain_command(CommandKind::kStay, 0));
 }
 
+/// A segment under way that the controller's own state ends.
+void UrRobot::note_cause(const RtdeReport& report, Instant stamp) {
+  const bool under_way = flight_ == Flight::kSent || flight_ == Flight::kMoving || cut_short_;
+  const bool ended = report.runtime != Runtime::kPlaying || report.robot_mode != kRobotModeRunning ||
+                     !may_move(safety_of(report.safety_mode));
+  if (!under_way || !ended) {
+    if (!ended) cause_.reset();
+  } else if (!cause_) {
+    cause_ = stamp;
+  }
+}
+
+void UrRobot::note_withdrawal(Instant now) {
+  const auto keep = [now](std::optional<double>& longest, Instant since) {
+    longest = std::max(longest.value_or(0), (now - since).seconds());
+  };
+  if (cause_) keep(delays_.react_s, *cause_);
+  const bool under_way = flight_ == Flight::kSent || flight_ == Flight::kMoving;
+  if (!cause_ && cut_short_ && cut_) keep(delays_.lost_s, *cut_);
+  if (!cause_ && under_way && heard_ && lost(now)) keep(delays_.lost_s, *heard_);
+  cause_.reset();
+  cut_short_ = false;
+}
+
 void UrRobot::command_stop(Instant now) {
+  note_withdrawal(now);
   if (program_.send(plain_command(CommandKind::kStop, ++stop_number_))) {
     flight_ = Flight::kStopping;
     sent_ = now;
@@ -194,6 +221,8 @@ void UrRobot::follow(const RtdeReport& report, Instant now) {
   report_ = report;
   heard_ = now;
   if (!opens_) opens_ = now + kSelfTest;
+  stamp_ = clock_.to_ours(report.timestamp_s, now);
+  note_cause(report, stamp_);
   follow_runtime(before, report.runtime, now);
   const bool stands = report.velocity_rad_s.max_abs() < kStanding_rad_s;
   if (flight_ == Flight::kArriving && ++standing_reports_ >= kStandingReports && stands) flight_ = Flight::kNone;
@@ -205,9 +234,9 @@ void UrRobot::follow(const RtdeReport& report, Instant now) {
   stay(now);
 }
 
-hal::ArmState UrRobot::state_of(const RtdeReport& report, Instant now) {
+hal::ArmState UrRobot::state_of(const RtdeReport& report) const {
   hal::ArmState state;
-  state.stamp = clock_.to_ours(report.timestamp_s, now);
+  state.stamp = stamp_;
   state.position_rad = report.position_rad;
   state.velocity_rad_s = report.velocity_rad_s;
   state.safety = safety_of(report.safety_mode);
@@ -231,7 +260,7 @@ std::optional<hal::ArmState> UrRobot::poll(Instant now) {
   // A program that plays and hears nothing from us: the same as if nothing came from the robot.
   if (cut_ && playing() && now - *cut_ > kProgramEnd) return std::nullopt;
   ++counters_.states;
-  return state_of(*report, now);
+  return state_of(*report);
 }
 
 // ---- hal::RobotArm
@@ -266,6 +295,7 @@ Status UrRobot::move(const hal::Segment& segment, Instant now) {
 
 void UrRobot::stop(Instant now) {
   ++counters_.stops;
+  note_withdrawal(now);
   const bool stands = report_.velocity_rad_s.max_abs() < kStanding_rad_s;
   if (flight_ == Flight::kStopping || (flight_ == Flight::kNone && stands)) return;
   command_stop(now);

@@ -28,6 +28,11 @@ struct UrDelays {
   double motion_s = 0;   ///< from there until the first segment had begun
   double accept_s = 0;   ///< from a segment's command until the program had begun it
   double stop_s = 0;     ///< from the command to stop until the program said that the arm stands
+  /// While a segment was under way: from the moment when the controller was stopped, paused or in a safety stop, by its
+  /// own clock, until firstlook had withdrawn the segment and given the command to stop. Empty: that did not happen.
+  std::optional<double> react_s;
+  /// The same from the last report of a link that was lost; kStale of it is the silence that tells.
+  std::optional<double> lost_s;
 };
 
 /// Never switches the power on, releases brakes or unlocks a stop. A segment is withdrawn by a pause, a stop, an end of
@@ -93,12 +98,16 @@ class UrRobot final : public hal::RobotArm {
   void follow_runtime(Runtime before, Runtime after, Instant now);
   void press(hal::OperatorAction action, Instant now);
   void command_stop(Instant now);
+  void note_cause(const RtdeReport& report, Instant stamp);
+  void note_withdrawal(Instant now);
   void stay(Instant now);
   void tell(std::string_view line);
-  [[nodiscard]] hal::ArmState state_of(const RtdeReport& report, Instant now);
+  [[nodiscard]] hal::ArmState state_of(const RtdeReport& report) const;
   [[nodiscard]] bool consent() const;
   [[nodiscard]] bool playing() const;
   [[nodiscard]] bool stale(Instant now) const { return !heard_ || now - *heard_ > kStale; }
+  /// The connection is gone, or silent for too long.
+  [[nodiscard]] bool lost(Instant now) const { return stale(now) || !rtde_.streaming(); }
 
   std::array<char, 16> model_{};
   NoticeSink* notices_;
@@ -110,11 +119,13 @@ class UrRobot final : public hal::RobotArm {
 
   RtdeReport report_;             ///< the newest
   std::optional<Instant> heard_;  ///< when it came
+  Instant stamp_{};               ///< and when it was so, on our clock
   std::optional<Instant> opens_;  ///< from when on programs are let in
   bool was_up_ = false;
   Instant played_{};
   bool moved_ = false;          ///< since then
   std::optional<Instant> cut_;  ///< since when the program plays without a connection to us
+  bool cut_short_ = false;      ///< a segment was under way when the connection ended
   bool consented_ = false;
 
   Flight flight_ = Flight::kNone;
@@ -125,6 +136,7 @@ class UrRobot final : public hal::RobotArm {
   bool withdrawn_ = false;  ///< by a pause: no consent until the program has stopped the arm
   std::int32_t stop_number_ = 0;
   Instant stayed_{};
+  std::optional<Instant> cause_;  ///< since when the controller says that nothing may move, with a segment under way
 
   FixedQueue<hal::OperatorEvent, 16> keys_;
   hal::ArmCounters counters_;

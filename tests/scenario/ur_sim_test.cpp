@@ -82,6 +82,45 @@ TEST_CASE("a client that does not read is dropped, the others go on", "[scenario
   CHECK(dashboard.ask("running") == "Program running: false");
 }
 
+TEST_CASE("what people and mishaps do to ur-sim: by a timetable, and by lines to its private port", "[scenario]") {
+  UrSim robot({"--model", "ur5e", "--running", "--at", "0.5=emergency-stop"});
+  Connection dashboard(robot, 29999);
+  static_cast<void>(dashboard.line());
+  wait_for_answer(dashboard, "safetymode", "Safetymode: ROBOT_EMERGENCY_STOP");
+  CHECK(dashboard.ask("robotmode") == "Robotmode: POWER_OFF");
+  Connection hand(robot, 30098);
+  CHECK_THAT(hand.line(), Contains("help"));
+  CHECK(hand.ask("release-emergency-stop") == "done");
+  CHECK_THAT(hand.ask("estop"), Contains("--at help"));
+  CHECK(dashboard.ask("brake release") == "Brake releasing");
+  wait_for_answer(dashboard, "robotmode", "Robotmode: RUNNING");
+
+  // A cable that is out: nothing comes, and all that was sent comes when it is in again.
+  CHECK(hand.ask("unplug") == "done");
+  dashboard.send("get robot model\n");
+  pollfd quiet{dashboard.descriptor(), POLLIN, 0};
+  CHECK(poll(&quiet, 1, 300) == 0);
+  CHECK(hand.ask("plug") == "done");
+  CHECK(dashboard.line() == "UR5");
+
+  // Switched off and on: the connection ends, and a new one finds nobody for some seconds.
+  CHECK(hand.ask("reboot") == "done");
+  while (dashboard.receive()) continue;
+  Connection early(robot, 29999);
+  CHECK_FALSE(early.receive());
+  CHECK(hand.ask("slider=0.5") == "done");
+}
+
+TEST_CASE("what cannot happen to ur-sim is refused before it begins", "[scenario]") {
+  const JobFolder folder;
+  const ProgramResult wrong = folder.run({"ur-sim", "--at", "5=estop"});
+  CHECK(wrong.exit_code == 2);
+  CHECK_THAT(wrong.err, Contains("--at") && Contains("estop"));
+  const ProgramResult help = folder.run({"ur-sim", "--at", "help"});
+  CHECK(help.exit_code == 0);
+  CHECK_THAT(help.out, Contains("emergency-stop") && Contains("reboot"));
+}
+
 TEST_CASE("a shutdown over the dashboard ends ur-sim", "[scenario]") {
   UrSim robot({});
   Connection dashboard(robot, 29999);

@@ -51,6 +51,12 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
       if (pipe.port == kControlPort) pipe.closed_by_us = pipe.closed_by_script = true;
     }
   }
+  /// The controller hangs up on all its clients; its program's connections stay.
+  void break_sessions() {
+    for (const Slot& slot : slots_) {
+      if (slot.session != nullptr) slot.session->cut_off();
+    }
+  }
   [[nodiscard]] int links_open() const {
     int count = 0;
     for (const Slot& slot : slots_) count += slot.kind != Slot::Kind::kFree;
@@ -69,7 +75,8 @@ class UrMemoryNetwork final : public ur::Network, public sim::ur::script::Socket
                                : service == ur::Service::kDashboard ? sim::ur::Port::kDashboard
                                                                     : sim::ur::Port::kPrimary;
     const ur::LinkId link = free_slot();
-    if (link != ur::kNoLink) slots_[at(link)] = {Slot::Kind::kSession, plugged_ ? &robot_.open(port) : nullptr, 0};
+    if (link != ur::kNoLink)
+      slots_[at(link)] = {Slot::Kind::kSession, plugged_ && robot_.serves(port) ? &robot_.open(port) : nullptr, 0};
     return link;
   }
   ur::LinkId accept(ur::Door door) override {

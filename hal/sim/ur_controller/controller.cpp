@@ -14,6 +14,7 @@ const JointVector kStart_rad = {-1.6007, -1.7271, -2.203, -0.808, 1.5951, -0.031
 constexpr double kPowerOn_s = 1.0;
 constexpr double kReleaseBrakes_s = 0.5;
 constexpr double kInspect_s = 5;  // of a protective stop, before it can be unlocked
+constexpr double kBoot_s = 10;    // real ones take about a minute
 
 constexpr double kProgramStop_rad_s2 = 10;
 constexpr double kProtectiveStop_rad_s2 = 20;
@@ -26,8 +27,9 @@ Vector6 vector_of_joints(const JointVector& q) {
 
 }  // namespace
 
-Controller::Controller(const ControllerIdentity& identity) : identity_(identity), motion_(identity_.arm, kStart_rad) {
-  state_.timestamp_s = kStartedBefore_s;
+Controller::Controller(const ControllerIdentity& identity)
+    : identity_(identity), motion_(identity_.arm, kStart_rad), clock_s_(kStartedBefore_s) {
+  state_.timestamp_s = clock_s_;
   report_arm();
 }
 
@@ -43,12 +45,15 @@ void Controller::set_safety(SafetyMode mode) {
 }
 
 void Controller::power_on() {
-  if (state_.robot_mode != RobotMode::kPowerOff || state_.emergency_stopped()) return;
+  const SafetyMode safety = state_.safety_mode;
+  const bool broken = safety == SafetyMode::kViolation || safety == SafetyMode::kFault;
+  if (state_.robot_mode != RobotMode::kPowerOff || state_.emergency_stopped() || broken) return;
   state_.robot_mode = RobotMode::kPowerOn;
   mode_until_ = state_.control_step + static_cast<std::uint64_t>(kPowerOn_s * identity_.frequency_hz());
 }
 
 void Controller::power_off() {
+  if (booting()) return;
   stop();
   motion_.lock();
   state_.robot_mode = RobotMode::kPowerOff;
@@ -77,10 +82,10 @@ bool Controller::unlock_protective_stop() {
 
 void Controller::restart_safety() {
   power_off();
-  set_safety(SafetyMode::kNormal);
+  set_safety(emergency_);
 }
 
-void Controller::protective_stop(std::string_view reason) {
+void Controller::protective_stop(std::string_view reason, Program program) {
   if (state_.robot_mode != RobotMode::kRunning || state_.safety_mode == SafetyMode::kProtectiveStop) return;
   set_safety(SafetyMode::kProtectiveStop);
   protective_since_ = state_.control_step;
@@ -88,17 +93,57 @@ void Controller::protective_stop(std::string_view reason) {
         .code = 153,
         .error = true,
         .text = fmt::format("Protective stop: {}", reason)});
+  resume_after_safeguard_ = false;
+  if (program == Program::kPauses) return pause();
   stop();
   static_cast<void>(motion_.stop(kProtectiveStop_rad_s2));
 }
 
-void Controller::emergency_stop(bool pressed) {
+void Controller::emergency_stop(bool pressed, SafetyMode button) {
+  emergency_ = pressed ? button : SafetyMode::kNormal;
   if (pressed) {
-    set_safety(SafetyMode::kRobotEmergencyStop);
+    set_safety(button);
     power_off();
-  } else if (state_.safety_mode == SafetyMode::kRobotEmergencyStop) {
+  } else if (state_.emergency_stopped()) {
     set_safety(SafetyMode::kNormal);
   }
+}
+
+void Controller::safety_error(SafetyMode mode) {
+  set_safety(mode);
+  tell({.kind = ControllerEvent::Kind::kErrorCode,
+        .code = 210,
+        .error = true,
+        .text = fmt::format("Safety system: {}", name_of(mode))});
+  power_off();
+}
+
+void Controller::set_limits(SafetyMode mode) {
+  const SafetyMode now = state_.safety_mode;
+  if (now != SafetyMode::kNormal && now != SafetyMode::kReduced && now != SafetyMode::kRecovery) return;
+  set_safety(mode);
+  if (mode == SafetyMode::kRecovery) stop();
+}
+
+void Controller::reboot() {
+  power_off();
+  const ControllerState before = state_;
+  state_ = {};
+  state_.control_step = before.control_step;
+  state_.safety_mode = emergency_;
+  state_.runtime = RuntimeState::kStopped;
+  state_.robot_mode = RobotMode::kBooting;
+  motion_.hold(false);
+  clock_s_ = 0;
+  clock_from_ = state_.control_step;
+  mode_until_ = state_.control_step + static_cast<std::uint64_t>(kBoot_s * identity_.frequency_hz());
+  static_cast<void>(events_.take());
+  arm_reported_ = false;
+  report_arm();
+}
+
+double Controller::simulated_s() const {
+  return kStartedBefore_s + static_cast<double>(state_.control_step) / identity_.frequency_hz();
 }
 
 void Controller::safeguard(bool open) {
@@ -165,7 +210,9 @@ Pose Controller::tcp_pose(const JointVector& q_rad) const {
 void Controller::advance_modes() {
   if (mode_until_ == 0 || state_.control_step < mode_until_) return;
   mode_until_ = 0;
-  if (state_.robot_mode == RobotMode::kPowerOn) {
+  if (state_.robot_mode == RobotMode::kBooting) {
+    state_.robot_mode = RobotMode::kPowerOff;
+  } else if (state_.robot_mode == RobotMode::kPowerOn) {
     state_.robot_mode = RobotMode::kIdle;
     if (releasing_) {
       mode_until_ = state_.control_step + static_cast<std::uint64_t>(kReleaseBrakes_s * identity_.frequency_hz());
@@ -216,8 +263,8 @@ void Controller::report_arm() {
 void Controller::step() {
   ++state_.control_step;
   // Counted, not added up: a day later the clock is still exact.
-  const auto cycles = static_cast<double>(state_.control_step);
-  state_.timestamp_s = kStartedBefore_s + cycles / identity_.frequency_hz();
+  const auto cycles = static_cast<double>(state_.control_step - clock_from_);
+  state_.timestamp_s = clock_s_ + cycles / identity_.frequency_hz();
   advance_modes();
   if (const auto fault = motion_.step(identity_.cycle.seconds(), state_.speed_slider)) protective_stop(name_of(*fault));
   state_.speed_scaling = state_.robot_mode == RobotMode::kRunning ? motion_.scale() : 0;

@@ -33,11 +33,27 @@ class Controller {
   void release_brakes();  ///< switches the power on first where that is needed
   /// False within 5 s of the stop: nobody can have looked at its cause.
   [[nodiscard]] bool unlock_protective_stop();
-  void restart_safety();
+  void restart_safety();  ///< after a violation or a fault; the power is off then
   // What happens to it.
-  void protective_stop(std::string_view reason);
-  void emergency_stop(bool pressed);
+  enum class Program : std::uint8_t { kEnds, kPauses };
+  /// @param program  what becomes of the one that runs: both are met, by version and cause
+  void protective_stop(std::string_view reason, Program program = Program::kEnds);
+  /// Takes the power. @param button  kRobotEmergencyStop: the pendant's, kSystemEmergencyStop: at the safety inputs
+  void emergency_stop(bool pressed, SafetyMode button = SafetyMode::kRobotEmergencyStop);
   void safeguard(bool open);  ///< a program that played goes on by itself when it is closed
+  /// The safety system has found an error, kViolation or kFault: no power until it is restarted.
+  void safety_error(SafetyMode mode);
+  /// kReduced (its limits are not), kRecovery (outside of its limits: nothing plays) or back to kNormal.
+  void set_limits(SafetyMode mode);
+  /// Its computer is switched off and on: the arm stands, nothing is left of programs, registers, tool and payload, and
+  /// its clock begins anew.
+  void reboot();
+  /// Nobody answers yet.
+  [[nodiscard]] bool booting() const { return state_.robot_mode == RobotMode::kBooting; }
+  /// Its clock is set, by so much.
+  void set_clock_forward(double by_s) { clock_s_ += by_s; }
+  /// A clock that neither is set nor begins anew, for whoever simulates the world around it.
+  [[nodiscard]] double simulated_s() const;
   void set_digital_input(int bit, bool value);
 
   // The program's life; its content is run by others.
@@ -59,6 +75,7 @@ class Controller {
   [[nodiscard]] Registers& outputs() { return state_.outputs; }
   void set_speed_slider(double fraction);  ///< clamped to 0..1; not finite: ignored
   void set_payload(const Payload& payload) { state_.payload = payload; }
+  void set_gravity(const Vector3& gravity_m_s2) { state_.gravity_m_s2 = gravity_m_s2; }
   void set_external_wrench(const Vector6& wrench) { state_.external_wrench = wrench; }
   void set_tcp_offset(const Vector6& flange_T_tcp);
   void set_script_line(std::uint32_t line) { state_.script_line = line; }
@@ -77,9 +94,12 @@ class Controller {
   ArmMotion motion_;
   ControllerState state_;
   EventLog events_;
+  double clock_s_;  ///< that its clock showed in cycle `clock_from_`
+  std::uint64_t clock_from_ = 0;
   std::uint64_t mode_until_ = 0;  ///< the cycle in which kPowerOn, or the release of brakes, ends; 0: nothing under way
   bool releasing_ = false;
   std::uint64_t protective_since_ = 0;
+  SafetyMode emergency_ = SafetyMode::kNormal;  ///< the button that is pressed
   bool resume_after_safeguard_ = false;
   bool arm_reported_ = false;  ///< poses are those of the joints
 };

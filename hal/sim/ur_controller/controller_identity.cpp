@@ -28,8 +28,10 @@ void correct(ArmModel& arm, std::uint64_t seed) {
     DhRow& row = arm.dh[j];
     row.theta_offset_rad += kCorrection_rad * random.normal();
     row.d_m += kCorrection_m * random.normal();
-    row.a_m += kCorrection_m * random.normal();
-    row.alpha_rad += kCorrection_rad * random.normal();
+    const double a_m = kCorrection_m * random.normal(), alpha_rad = kCorrection_rad * random.normal();
+    if (j + 1 == kJoints) continue;  // the flange has no axis behind it: factories leave its a and alpha at 0
+    row.a_m += a_m;
+    row.alpha_rad += alpha_rad;
   }
 }
 

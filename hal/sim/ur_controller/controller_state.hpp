@@ -70,6 +70,8 @@ struct ControllerState {
   double speed_scaling = 0;
   Payload payload;
   Vector6 external_wrench{};
+  /// What holds the base up against gravity, in Base (m/s²): how the robot is mounted. Upright, as factories set it.
+  Vector3 gravity_m_s2{0, 0, 9.82};
   InputsOutputs io;
   Registers inputs, outputs;
   std::uint32_t script_line = 0;  ///< that has the arm under its control; 0 for none

@@ -105,7 +105,9 @@ std::string polyscope_version(DashboardSession& s, Argument) {
 std::string version(DashboardSession& s, Argument) { return s.controller().identity().version_text(); }
 std::string robot_model(DashboardSession& s, Argument) { return std::string(s.controller().identity().model); }
 std::string serial_number(DashboardSession& s, Argument) { return s.controller().identity().serial; }
-std::string is_in_remote_control(DashboardSession&, Argument) { return "true"; }
+std::string is_in_remote_control(DashboardSession& s, Argument) {
+  return s.dashboard().remote_control ? "true" : "false";
+}
 
 std::string power_on(DashboardSession& s, Argument) {
   s.controller().power_on();

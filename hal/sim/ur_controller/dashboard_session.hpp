@@ -12,6 +12,7 @@ struct DashboardState {
   std::string operational_mode = "NONE";
   std::string user_role = "PROGRAMMER";
   int flight_reports = 0;
+  bool remote_control = true;
   bool shutting_down = false;
 };
 

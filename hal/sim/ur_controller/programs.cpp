@@ -23,6 +23,14 @@ void Programs::set_sockets(script::Sockets* sockets) {
   sockets_ = sockets;
 }
 
+void Programs::forget() {
+  program_.reset();
+  request_.reset();
+  pending_.reset();
+  secondary_.clear();
+  loaded_ = nullptr;
+}
+
 void Programs::tell_error(const script::ScriptError& error) {
   controller_.tell({.kind = Kind::kRuntimeException, .code = error.line, .argument = error.column, .text = error.text});
 }

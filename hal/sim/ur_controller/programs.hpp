@@ -27,6 +27,9 @@ class Programs {
   /// How scripts reach other computers; null: not at all. Must outlive this, or be set to null again.
   void set_sockets(script::Sockets* sockets);
 
+  /// The controller's computer was switched off: nothing runs, nothing is loaded.
+  void forget();
+
   /// One control cycle, after the controller's.
   void step();
 

@@ -41,7 +41,6 @@ struct InputRow {
 
 void none(C, int, W wire) { wire.f64(0); }
 void none6(C, int, W wire) { wire.f64s(Vector6{}); }
-void none3(C, int, W wire) { wire.f64s(Vector3{}); }
 void none_u32(C, int, W wire) { wire.u32(0); }
 void none_u8(C, int, W wire) { wire.u8(0); }
 void none_i32(C, int, W wire) { wire.i32(0); }
@@ -151,7 +150,7 @@ constexpr OutputRow kOutputs[] = {
     {"collision_detection_ratio", T::kDouble, kESeriesOnly, none},
     {"encoder*_raw", T::kInt32, kESeriesOnly, none_i32, 0, 1},
     {"tcp_offset", T::kVector6d, kESeriesOnly, [](C c, int, W w) { w.f64s(c.state().tcp_offset); }},
-    {"target_gravity", T::kVector3d, kESeriesOnly, none3},
+    {"target_gravity", T::kVector3d, kESeriesOnly, [](C c, int, W w) { w.f64s(c.state().gravity_m_s2); }},
     {"time_scale_source", T::kInt32, kESeriesOnly, none_i32},
 };
 

@@ -21,8 +21,16 @@ class Session {
   /// The client is gone: what it held is free again.
   virtual void closed() {}
 
+  /// The controller is gone: nothing of what waited is sent any more.
+  void cut_off() {
+    output_.clear();
+    over_ = true;
+  }
+
   /// To be sent; whoever sends takes it from the front.
   [[nodiscard]] std::string& output() { return output_; }
+  /// Of the simulation, which a reboot of the controller does not end.
+  [[nodiscard]] virtual bool is_private() const { return false; }
   /// The session is over once its output is sent.
   [[nodiscard]] bool over() const { return over_; }
 

@@ -1,5 +1,6 @@
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 
+#include "hal/sim/ur_controller/happenings_session.hpp"
 #include "hal/sim/ur_controller/primary_packets.hpp"
 #include "hal/sim/ur_controller/truth_session.hpp"
 #include "platform/core/ensure.hpp"
@@ -24,6 +25,8 @@ std::string_view name_of(Port port) {
       return "secondary, read-only";
     case Port::kRealtimeReadOnly:
       return "realtime, read-only";
+    case Port::kHappenings:
+      return "what people and mishaps do to it";
     case Port::kTruth:
       return "true joints, for simulated cameras";
   }
@@ -32,6 +35,7 @@ std::string_view name_of(Port port) {
 
 SimulatedUr::SimulatedUr(const ControllerIdentity& identity, const SimulatedUrOptions& options)
     : controller_(identity), programs_(controller_, options.programs) {
+  dashboard_.remote_control = options.remote_control;
   if (options.start_rad) controller_.place(*options.start_rad);
   if (!options.running) return;
   controller_.release_brakes();
@@ -46,6 +50,21 @@ void SimulatedUr::step() {
     for (StateSession* listener : event_listeners_) listener->on_event(message);
   }
   for (const std::unique_ptr<Session>& session : sessions_) session->on_cycle();
+}
+
+void SimulatedUr::reboot() {
+  programs_.forget();
+  const bool remote_control = dashboard_.remote_control;
+  dashboard_ = {};
+  dashboard_.remote_control = remote_control;
+  for (const std::unique_ptr<Session>& session : sessions_) {
+    if (!session->is_private()) session->cut_off();
+  }
+  controller_.reboot();
+}
+
+bool SimulatedUr::serves(Port port) const {
+  return !controller_.booting() || port == Port::kTruth || port == Port::kHappenings;
 }
 
 Session& SimulatedUr::open(Port port) {
@@ -73,6 +92,9 @@ Session& SimulatedUr::open(Port port) {
       break;
     case Port::kRtde:
       session = std::make_unique<RtdeSession>(controller_, owners_);
+      break;
+    case Port::kHappenings:
+      session = std::make_unique<HappeningsSession>(*this);
       break;
     case Port::kTruth:
       session = std::make_unique<TruthSession>(controller_);

@@ -21,7 +21,8 @@ enum class Port : std::uint16_t {
   kPrimaryReadOnly = 30011,
   kSecondaryReadOnly = 30012,
   kRealtimeReadOnly = 30013,
-  kTruth = 30099,  ///< private: truth_session.hpp
+  kHappenings = 30098,  ///< private: happenings.hpp
+  kTruth = 30099,       ///< private: truth_session.hpp
 };
 /// What a controller serves.
 inline constexpr std::array kPorts = {
@@ -34,6 +35,7 @@ struct SimulatedUrOptions {
   std::vector<StoredProgram> programs;     ///< that `load` finds
   bool running = false;                    ///< starts with the brakes released instead of without power
   std::optional<JointVector> start_rad{};  ///< where the arm stands at first
+  bool remote_control = true;              ///< what an e-Series answers; it takes the network's Play in both
 };
 
 class SimulatedUr {
@@ -43,6 +45,16 @@ class SimulatedUr {
   /// One control cycle of `cycle()`: robot, program, then what is due on every session.
   void step();
   [[nodiscard]] Duration cycle() const { return controller_.identity().cycle; }
+
+  /// The controller's computer is switched off and on: every connection and program ends, and for some seconds nobody
+  /// answers.
+  void reboot();
+  /// False while it boots: no port is there but the private ones.
+  [[nodiscard]] bool serves(Port port) const;
+  void set_remote_control(bool on) { dashboard_.remote_control = on; }
+  /// The cable of its network: whoever carries its bytes carries none while it is out.
+  void plug(bool in) { cable_in_ = in; }
+  [[nodiscard]] bool cable_in() const { return cable_in_; }
 
   /// A client connects. The session lives until `close`.
   [[nodiscard]] Session& open(Port port);
@@ -57,6 +69,7 @@ class SimulatedUr {
   Controller controller_;
   Programs programs_;
   DashboardState dashboard_;
+  bool cable_in_ = true;
   RtdeInputOwners owners_;
   std::vector<std::unique_ptr<Session>> sessions_;
   std::vector<StateSession*> event_listeners_;

@@ -7,7 +7,6 @@
 namespace firstlook::sim::ur {
 namespace {
 
-constexpr std::string_view kProgram = "external_control.urp";
 constexpr std::size_t kUnreadMax = 2 << 20;
 
 void tell_bytes(WireWriter& wire, std::uint8_t link, std::string& bytes) {
@@ -21,8 +20,9 @@ void tell_bytes(WireWriter& wire, std::uint8_t link, std::string& bytes) {
 
 }  // namespace
 
-SteppedService::SteppedService(SimulatedUr& robot, const ControllerScript& script) : robot_(robot), script_(script) {
-  std::stable_sort(script_.begin(), script_.end(), [](const auto& a, const auto& b) { return a.stamp < b.stamp; });
+SteppedService::SteppedService(SimulatedUr& robot, Timetable timetable)
+    : robot_(robot), timetable_(std::move(timetable)) {
+  std::ranges::stable_sort(timetable_, {}, &TimedHappening::stamp);
   robot_.programs().set_sockets(this);
 }
 
@@ -84,7 +84,7 @@ bool SteppedService::act(Ask what, WireReader& wire) {
 }
 
 void SteppedService::hear(Link& link, std::string_view bytes) {
-  if (!cable_in_ && !link.is_truth()) return;
+  if (!robot_.cable_in() && !link.is_truth()) return;
   if (link.session == nullptr) {
     link.to_script.append(bytes);
   } else if (!link.session->over()) {
@@ -94,44 +94,18 @@ void SteppedService::hear(Link& link, std::string_view bytes) {
 
 void SteppedService::step_to(Instant until) {
   for (auto& [number, link] : links_) {
-    const bool reached = cable_in_ || link.is_truth();
-    if (link.dialled && link.session == nullptr && reached) link.session = &robot_.open(*link.dialled);
+    if (!link.dialled || link.session != nullptr) continue;
+    const bool reached = robot_.cable_in() && robot_.serves(*link.dialled);
+    if (reached || link.is_truth()) link.session = &robot_.open(*link.dialled);
   }
   while (true) {
-    for (; begun_ && script_next_ < script_.size() && script_[script_next_].stamp <= time_; ++script_next_) {
-      happen(script_[script_next_].action);
+    for (; begun_ && next_ < timetable_.size() && timetable_[next_].stamp <= time_; ++next_) {
+      happen(timetable_[next_].happening, robot_);
     }
     if (time_ + robot_.cycle() > until) return;
     robot_.step();
     time_ = time_ + robot_.cycle();
   }
-}
-
-void SteppedService::happen(ControllerAction action) {
-  Controller& controller = robot_.controller();
-  switch (action) {
-    case ControllerAction::kPlay:
-      return press_play();
-    case ControllerAction::kPause:
-      static_cast<void>(robot_.programs().pause());
-      return;
-    case ControllerAction::kStop:
-      static_cast<void>(robot_.programs().stop());
-      return;
-    case ControllerAction::kProtectiveStop:
-      return controller.protective_stop("a fault that was asked for");
-    case ControllerAction::kEmergencyStop:
-      return controller.emergency_stop(true);
-    case ControllerAction::kLinkLost:
-      cable_in_ = false;
-      return;
-  }
-}
-
-void SteppedService::press_play() {
-  Programs& programs = robot_.programs();
-  if (programs.loaded_name() != kProgram && !programs.load(kProgram)) return;
-  static_cast<void>(programs.play());
 }
 
 void SteppedService::tell(std::string& told) {
@@ -142,7 +116,7 @@ void SteppedService::tell(std::string& told) {
   };
   for (auto& [number, link] : links_) {
     std::string& out = link.session != nullptr ? link.session->output() : link.out;
-    if (link.closed_here || (!cable_in_ && !link.is_truth())) {
+    if (link.closed_here || (!robot_.cable_in() && !link.is_truth())) {
       out.clear();
       continue;
     }
@@ -177,7 +151,7 @@ void SteppedService::hang_up() {
 }
 
 script::Sockets::Id SteppedService::open(const std::string&, std::uint16_t port) {
-  if (!cable_in_) return 0;
+  if (!robot_.cable_in()) return 0;
   std::uint8_t number = kScriptLinks;
   while (links_.contains(number)) {
     if (++number == 0) return 0;

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/ur_controller/happenings.hpp"
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 #include "hal/sim/ur_controller/wire.hpp"
 #include "platform/core/result.hpp"
@@ -37,9 +37,8 @@ enum class Tell : std::uint8_t {
 /// Deterministic: the same turns get the same answers, in process or in two.
 class SteppedService final : public script::Sockets {
  public:
-  /// @param script  what happens to the robot, on the time of the turns; Play loads external_control.urp where nothing
-  /// is
-  SteppedService(SimulatedUr& robot, const ControllerScript& script);
+  /// @param timetable  what happens to the robot, on the time of the turns
+  SteppedService(SimulatedUr& robot, Timetable timetable);
   ~SteppedService() override;
   SteppedService(const SteppedService&) = delete;
   SteppedService& operator=(const SteppedService&) = delete;
@@ -74,16 +73,13 @@ class SteppedService final : public script::Sockets {
   [[nodiscard]] bool act(Ask what, WireReader& wire);
   void hear(Link& link, std::string_view bytes);
   void step_to(Instant until);
-  void happen(ControllerAction action);
-  void press_play();
   void tell(std::string& told);
   void drop_if_done(Links::iterator link);
 
   SimulatedUr& robot_;
-  ControllerScript script_;
-  std::size_t script_next_ = 0;
+  Timetable timetable_;
+  std::size_t next_ = 0;
   bool begun_ = false;
-  bool cable_in_ = true;
   Instant time_{};
   Links links_;
 };

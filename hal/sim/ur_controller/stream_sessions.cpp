@@ -46,6 +46,8 @@ void ScriptSession::run(const std::string& program) {
     static_cast<void>(programs_.pause());
   } else if (command == "resume program") {
     static_cast<void>(programs_.play());
+  } else if (command == "run program") {
+    // The last line of many script files; their `def` runs by itself.
   } else {
     programs_.submit(program);
   }

@@ -1,8 +1,13 @@
 #include "hal/sim/ur_controller/tcp_service.hpp"
 
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <map>
 
+#include "hal/sim/ur_controller/happenings_session.hpp"
 #include "hal/sim/ur_controller/lockstep.hpp"
 #include "hal/sim/ur_controller/stepped_service.hpp"
 #include "hal/sim/ur_controller/truth_session.hpp"
@@ -20,10 +25,12 @@ constexpr std::int64_t kLateMax_ns = 500'000'000;      // after a longer sleep t
 
 class TcpService final : public TcpEvents, public script::Sockets {
  public:
-  TcpService(SimulatedUr& robot, const TcpServiceOptions& options) : robot_(robot) {
+  TcpService(SimulatedUr& robot, const TcpServiceOptions& options) : robot_(robot), console_(options.console) {
     if (options.lockstep) {
-      stepped_.emplace(robot, script_of(options));
+      stepped_.emplace(robot, timetable_of(options));
     } else {
+      timetable_ = options.timetable;
+      std::ranges::stable_sort(timetable_, {}, &TimedHappening::stamp);
       robot_.programs().set_sockets(this);
     }
   }
@@ -43,6 +50,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
     for (const Port port : kPorts) {
       if (const Status listening = listen(options, port); !listening) return listening;
     }
+    if (const Status listening = listen(options, Port::kHappenings); !listening) return listening;
     if (options.truth) {
       if (const Status listening = listen(options, Port::kTruth); !listening) return listening;
     }
@@ -57,19 +65,26 @@ class TcpService final : public TcpEvents, public script::Sockets {
   void run_in_lockstep() {
     while (!stop_signal_received() && !finished()) {
       tcp_.poll(monotonic_ns() + kLook_ns, waiting_, *this);
+      hear_console();
       flush();
     }
   }
 
   void run(double play_after_s) {
-    std::int64_t due_ns = monotonic_ns() + robot_.cycle().ns;
+    const std::int64_t begun_ns = monotonic_ns();
+    std::int64_t due_ns = begun_ns + robot_.cycle().ns;
     if (play_after_s >= 0) play_at_ns_ = due_ns + static_cast<std::int64_t>(play_after_s * 1e9);
     while (!stop_signal_received() && !finished()) {
       tcp_.poll(due_ns, waiting_, *this);
       const std::int64_t now_ns = monotonic_ns();
       if (now_ns - due_ns > kLateMax_ns) due_ns = now_ns;
       for (; due_ns <= now_ns; due_ns += robot_.cycle().ns) robot_.step();
-      if (now_ns >= play_at_ns_) press_play(now_ns);
+      if (now_ns >= play_at_ns_) play_again(now_ns);
+      for (; next_ < timetable_.size() && timetable_[next_].stamp.ns <= now_ns - begun_ns; ++next_) {
+        happen(timetable_[next_].happening, robot_);
+      }
+      hear_console();
+      plug();
       flush();
     }
   }
@@ -79,6 +94,8 @@ class TcpService final : public TcpEvents, public script::Sockets {
       dialled->second.state = State::kOpen;
     } else if (stepped_ && ports_.at(listener) == Port::kTruth) {
       begin_lockstep(connection);
+    } else if (!robot_.serves(ports_.at(listener))) {
+      tcp_.abort(connection);  // as a computer that boots: nobody is there
     } else {
       session_ports_[connection] = ports_.at(listener);
       sessions_[connection] = &robot_.open(ports_.at(listener));
@@ -86,6 +103,10 @@ class TcpService final : public TcpEvents, public script::Sockets {
   }
 
   void received(TcpId connection, std::string_view bytes) override {
+    if (!reaches(connection)) {
+      held_[connection].append(bytes.substr(0, kUnreadMax - std::min(kUnreadMax, held_[connection].size())));
+      return;
+    }
     if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
       std::string& waiting = dialled->second.received;
       waiting.append(bytes);
@@ -98,6 +119,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
   }
 
   void closed(TcpId connection) override {
+    held_.erase(connection);
     if (const auto dialled = dialled_.find(connection); dialled != dialled_.end()) {
       dialled->second.state = State::kClosed;  // what came before can still be read
       return;
@@ -112,6 +134,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
 
   // The connections of scripts.
   Id open(const std::string& host, std::uint16_t port) override {
+    if (!robot_.cable_in()) return 0;
     const Result<TcpId> connection = tcp_.dial(host, port);
     if (!connection) return 0;
     dialled_[*connection] = {};
@@ -126,7 +149,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
     if (found == dialled_.end() || found->second.state != State::kOpen) return false;
     std::string& unsent = found->second.unsent;
     unsent.append(bytes);
-    return tcp_.send(socket, unsent) && unsent.size() <= kUnreadMax;
+    return (!robot_.cable_in() || tcp_.send(socket, unsent)) && unsent.size() <= kUnreadMax;
   }
   std::string& received(Id socket) override { return dialled_[socket].received; }
   void close(Id socket) override {
@@ -140,13 +163,42 @@ class TcpService final : public TcpEvents, public script::Sockets {
     std::string received, unsent;
   };
 
-  /// What somebody at the pendant does.
-  static ControllerScript script_of(const TcpServiceOptions& options) {
-    ControllerScript script;
+  /// With what somebody at the pendant does.
+  static Timetable timetable_of(const TcpServiceOptions& options) {
+    Timetable timetable = options.timetable;
     if (options.play_after_s >= 0) {
-      script.push_back({Instant{seconds(options.play_after_s).ns}, ControllerAction::kPlay});
+      timetable.push_back({Instant{seconds(options.play_after_s).ns}, *read_happening("play")});
     }
-    return script;
+    return timetable;
+  }
+
+  /// Bytes of this connection get through: its cable is in, or it is one of the simulation's own.
+  [[nodiscard]] bool reaches(TcpId connection) const {
+    if (robot_.cable_in() || connection == stepper_) return true;
+    const auto port = session_ports_.find(connection);
+    return port != session_ports_.end() && (port->second == Port::kTruth || port->second == Port::kHappenings);
+  }
+
+  /// TCP brings what was sent meanwhile once the cable is in again.
+  void plug() {
+    if (!robot_.cable_in() || held_.empty()) return;
+    const auto held = std::exchange(held_, {});
+    for (const auto& [connection, bytes] : held) received(connection, bytes);
+  }
+
+  void hear_console() {
+    while (console_) {
+      pollfd input{STDIN_FILENO, POLLIN, 0};
+      if (poll(&input, 1, 0) <= 0) return;
+      char buffer[512];
+      const ssize_t count = read(STDIN_FILENO, buffer, sizeof buffer);
+      console_ = count > 0;  // its end leaves the robot running
+      if (console_) typed_.append(buffer, static_cast<std::size_t>(count));
+      for (std::size_t end = typed_.find('\n'); end != std::string::npos; end = typed_.find('\n')) {
+        std::fprintf(stderr, "ur-sim: %s\n", answer_happening(typed_.substr(0, end), robot_).c_str());
+        typed_.erase(0, end + 1);
+      }
+    }
   }
 
   void begin_lockstep(TcpId connection) {
@@ -190,6 +242,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
     }
     std::vector<TcpId> done, dropped;
     for (const auto& [connection, session] : sessions_) {
+      if (!reaches(connection) && session->output().size() <= kUnreadMax) continue;
       const bool alive = tcp_.send(connection, session->output());
       const bool all_sent = session->output().empty();
       if (session->output().size() > kUnreadMax) {
@@ -201,7 +254,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
       }
     }
     for (auto& [connection, dialled] : dialled_) {
-      if (dialled.state != State::kOpen || dialled.unsent.empty()) continue;
+      if (dialled.state != State::kOpen || dialled.unsent.empty() || !robot_.cable_in()) continue;
       static_cast<void>(tcp_.send(connection, dialled.unsent));
       if (!dialled.unsent.empty()) waiting_.push_back(connection);
     }
@@ -217,15 +270,9 @@ class TcpService final : public TcpEvents, public script::Sockets {
     }
   }
 
-  void press_play(std::int64_t now_ns) {
-    constexpr std::string_view kProgram = "external_control.urp";
-    play_at_ns_ = now_ns + kPlayAgain_ns;
-    Programs& programs = robot_.programs();
-    if (robot_.controller().playing()) {
-      play_at_ns_ = INT64_MAX;
-    } else if (programs.loaded_name() == kProgram || programs.load(kProgram)) {
-      static_cast<void>(programs.play());
-    }
+  void play_again(std::int64_t now_ns) {
+    play_at_ns_ = robot_.controller().playing() ? INT64_MAX : now_ns + kPlayAgain_ns;
+    if (play_at_ns_ != INT64_MAX) press_play(robot_);
   }
 
   SimulatedUr& robot_;
@@ -233,6 +280,11 @@ class TcpService final : public TcpEvents, public script::Sockets {
   TcpId stepper_ = 0;                      ///< its client
   std::string from_stepper_, to_stepper_;
   std::int64_t play_at_ns_ = INT64_MAX;
+  Timetable timetable_;
+  std::size_t next_ = 0;
+  bool console_;
+  std::string typed_;
+  std::map<TcpId, std::string> held_;  ///< what came while the cable was out
   Tcp tcp_;
   std::map<TcpId, Port> ports_;
   std::map<TcpId, Session*> sessions_;

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "hal/sim/ur_controller/simulated_ur.hpp"
+#include "hal/sim/ur_controller/happenings.hpp"
 
 namespace firstlook::sim::ur {
 
@@ -17,6 +17,8 @@ struct TcpServiceOptions {
   /// The robot's time is that of the client of the private channel, and stands still without one. What its programs
   /// dial is carried there, too; Play is pressed once, so long after the job's begin.
   bool lockstep = false;
+  Timetable timetable{};  ///< what happens to the robot, and when
+  bool console = false;   ///< the same by lines on stdin, answered on stderr
 };
 
 /// Serves all ports until SIGINT, SIGTERM (see catch_stop_signals) or a client's `shutdown`; says on stderr which ports

@@ -28,7 +28,7 @@ void TruthSession::on_cycle() {
   const ControllerState& state = controller_.state();
   if (state.control_step % every_cycles_ != 0) return;
   WireWriter wire(output());
-  wire.f64(state.timestamp_s);
+  wire.f64(controller_.simulated_s());
   wire.f64s(state.q_rad);
 }
 

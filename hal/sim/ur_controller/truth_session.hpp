@@ -9,8 +9,9 @@
 
 namespace firstlook::sim::ur {
 
-// Big-endian. First kTruthGreeting and the true DH table: theta, d, a, alpha of each joint. Then 125 times a second the
-// controller's time (s) and six joint angles. Bytes of the other side: kTouched, when the body touches something.
+// Big-endian. First kTruthGreeting and the true DH table: theta, d, a, alpha of each joint. Then 125 times a second a
+// time that no reboot touches (s) and six joint angles. Bytes of the other side: kTouched, when the body touches
+// something.
 inline constexpr std::string_view kTruthGreeting = "FLT1";
 /// In place of it when the robot's time is that of its client: turns follow (stepped_service.hpp).
 inline constexpr std::string_view kLockstepGreeting = "FLL1";
@@ -23,6 +24,7 @@ class TruthSession final : public Session {
   explicit TruthSession(Controller& controller);
   void receive(std::string_view bytes) override;
   void on_cycle() override;
+  [[nodiscard]] bool is_private() const override { return true; }
 
  private:
   Controller& controller_;

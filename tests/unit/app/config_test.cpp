@@ -89,7 +89,9 @@ Config all_changed() {
              "depth_info.yaml",
              {-0.025, 0.001, 0.002},
              {0.5, -0.3, 180}};
-  c.robot = {"192.168.56.101", "192.168.56.1", 50012, 50011, 100, 1.25};
+  JointVector tcp = JointVector::zero(6);
+  tcp[2] = 0.12;
+  c.robot = {"192.168.56.101", "192.168.56.1", 50012, 50011, 100, 1.25, tcp, "robot.yaml"};
   c.map = {0.02, {-1, -1, 0},    {1, 1, 1},       60,   30,   0.002,         "clear_when_corroborated",
            0.01, {-0.5, 0, 0.1}, {0.5, 0.4, 0.6}, -0.8, 0.03, "color,label", "earlier/map.ot"};
   c.explore = {61, 401, 2001, 9, 3, "thesis2014"};

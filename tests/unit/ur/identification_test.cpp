@@ -1,5 +1,6 @@
 #include "hal/ur/identification.hpp"
 
+#include "hal/ur/network_robot.hpp"
 #include "platform/core/random.hpp"
 #include "tests/support/sanitized_builds.hpp"
 #include "tests/support/ur_memory_network.hpp"
@@ -91,6 +92,82 @@ TEST_CASE("a stopped controller and one in recovery are refused", "[ur]") {
   CHECK(check_robot(*found, {"ur5"}));
   found->kinematics.rows[3].a_m = std::nan("");
   CHECK_FALSE(check_robot(*found, {"ur5"}));
+}
+
+TEST_CASE("a TCP that is not the configured one is refused, with both and what to do", "[ur]") {
+  Site site("ur5e");
+  site.robot.controller().set_tcp_offset({0, 0, 0.15, 0, 0, 3.1});
+  const auto found = site.identify();
+  REQUIRE(found);
+  const auto check = [&](std::array<double, 6> tcp) { return check_robot(*found, {"ur5e", tcp}); };
+  CHECK(check_robot(*found, {"ur5e"}));
+  CHECK(check({0, 0, 0.15, 0, 0, 3.1}));
+  CHECK(check({0, 0, 0.15005, 0, 0, 3.1 - 2 * M_PI}));  // the same turn, the other way round
+  for (const std::array<double, 6> other : {std::array<double, 6>{0, 0, 0.16, 0, 0, 3.1}, {0, 0, 0.15, 0, 0, 0}}) {
+    const Status refused = check(other);
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().fault == Fault::kConfigBadValue);
+    CHECK_THAT(std::string(refused.error().detail()),
+               Contains("robot.tcp_offset") && Contains("0.1500") && Contains("Installation"));
+  }
+}
+
+namespace {
+
+Status connects(Site& site, const NetworkRobotOptions& options) {
+  test::UrMemoryNetwork& network = site.network;
+  struct NetworkClock final : Clock {
+    explicit NetworkClock(test::UrMemoryNetwork& net) : network(net) {}
+    [[nodiscard]] Instant now() const override { return at; }
+    void sleep_until(Instant until) override { network.advance(at = until); }
+    void wake() noexcept override {}
+    [[nodiscard]] bool is_virtual() const override { return true; }
+    test::UrMemoryNetwork& network;
+    Instant at{};
+  } clock(network);
+  const auto robot = NetworkRobot::connect(network, clock, options, nullptr);
+  return robot ? Status{} : std::unexpected(robot.error());
+}
+
+}  // namespace
+
+TEST_CASE("a mounting that is not the configured one is refused where the controller tells it", "[ur]") {
+  const double tilt_rad = GENERATE(0.0, 0.02, 0.3, M_PI / 2, M_PI);
+  Site site("ur5e");
+  site.robot.controller().set_gravity({0, 9.82 * std::sin(tilt_rad), 9.82 * std::cos(tilt_rad)});
+  NetworkRobotOptions options;
+  options.robot.model = "ur5e";
+  for (const bool upright : {true, false}) {
+    options.upright = upright;
+    const Status connected = connects(site, options);
+    INFO(tilt_rad << (upright ? " upright" : " tilted"));
+    CHECK(connected.has_value() == ((tilt_rad < 0.05) == upright));
+    if (connected) continue;
+    CHECK(connected.error().fault == Fault::kConfigBadValue);
+    CHECK_THAT(std::string(connected.error().detail()), Contains("arm.mounting") && Contains("Mounting"));
+  }
+}
+
+TEST_CASE("a CB3 does not tell its mounting, and is taken as configured", "[ur]") {
+  Site site("ur5");
+  site.robot.controller().set_gravity({0, 9.82, 0});
+  NetworkRobotOptions options;
+  CHECK(connects(site, options));
+  options.payload_kg = 1;
+  CHECK_FALSE(connects(site, options));
+}
+
+TEST_CASE("in remote control nobody's Play is a person's: refused where the pendant is to start", "[ur]") {
+  Site site("ur5e");
+  const bool remote = GENERATE(false, true);
+  site.robot.set_remote_control(remote);
+  const auto found = site.identify();
+  REQUIRE(found);
+  CHECK(found->remote_control == remote);
+  CHECK(check_robot(*found, {"ur5e"}));
+  const Status status = check_robot(*found, {"ur5e", {}, true});
+  CHECK(status.has_value() == !remote);
+  if (!status) CHECK_THAT(std::string(status.error().detail()), Contains("local control") && Contains("start_source"));
 }
 
 TEST_CASE("nobody there is said within the limit", "[ur]") {

@@ -26,7 +26,7 @@ struct Stepped {
   explicit Stepped(const char* model, const sim::ControllerScript& happens = script({kPlay}))
       : controller(*sim::ur::identify_controller(model, 7, ""),
                    {{{"external_control.urp", "", {"127.0.0.1", 50002}}}, true, {}}),
-        service(controller, happens) {
+        service(controller, sim::ur::timetable_of(happens)) {
     REQUIRE(truth.connect());
     SteppedClock clock(links);
     ur::NetworkRobotOptions options;

@@ -1,11 +1,13 @@
 /// The driver against the simulated controller, which runs our own program: in memory and in virtual time.
 #include "hal/ur/ur_robot.hpp"
 
+#include "hal/sim/ur_controller/happenings.hpp"
 #include "hal/ur/control_script.hpp"
 #include "tests/support/driven_ur.hpp"
 
 namespace firstlook {
 using hal::OperatorAction;
+using ur::UrDelays;
 
 namespace {
 
@@ -218,6 +220,133 @@ TEST_CASE("an emergency stop and a safeguard stop end consent; a gate that close
     arm.ur.robot.controller().safeguard(false);
     CHECK(playing.turned(1) < kFirstCycle_rad);
   }
+}
+
+namespace {
+
+/// As firstlook's machine does in the turn of the loop in which a report or its absence tells it: stop. Returns when it
+/// did so first.
+std::optional<Instant> obey(test::DrivenUr& arm, double s) {
+  std::optional<Instant> stopped;
+  for (const Instant until = arm.now() + seconds(s); arm.now() < until;) {
+    arm.run(0.002);
+    const bool lost = arm.now() - arm.last.stamp > milliseconds(100);
+    if (!lost && arm.last.program_running && arm.last.safety == hal::ArmSafety::kNormal) continue;
+    if (!stopped) stopped = arm.now();
+    arm.robot.stop(arm.now());
+  }
+  return stopped;
+}
+
+/// One turn of the loop, and one report: a cycle of a CB3, four of an e-Series.
+constexpr double kTurnAndReport_s = 0.002 + 0.008 + 1e-6;
+
+}  // namespace
+
+TEST_CASE("from whatever stops the controller to the command to stop: one turn of the loop and one report", "[ur]") {
+  const std::string model = GENERATE("ur5", "ur5e");
+  const std::string what = GENERATE("stop", "pause", "emergency-stop", "system-emergency-stop", "open-safeguard",
+                                    "protective-stop", "protective-stop-paused", "safety-violation", "power-off");
+  const double at_s = GENERATE(1.0, 1.002, 1.006);
+  INFO(model << ": " << what << " at " << at_s);
+  Playing playing(model.c_str());
+  test::DrivenUr& arm = playing.arm;
+  playing.move(1, 5);
+  CHECK_FALSE(obey(arm, at_s));
+  CHECK_FALSE(arm.robot.delays().react_s);
+  REQUIRE(arm.last.moving);
+  const Instant happened = arm.now();
+  happen(*sim::ur::read_happening(what), arm.ur.robot);
+  const auto stopped = obey(arm, 0.05);
+  REQUIRE(stopped);
+  CHECK((*stopped - happened).seconds() <= kTurnAndReport_s);
+  REQUIRE(arm.robot.delays().react_s);
+  CHECK(*arm.robot.delays().react_s <= kTurnAndReport_s);
+  CHECK_FALSE(arm.robot.delays().lost_s);
+  static_cast<void>(obey(arm, 1));
+  CHECK_FALSE(arm.last.moving);
+  CHECK_FALSE(arm.last.program_running);
+  CHECK(playing.turned(1) < kStands_rad);
+}
+
+TEST_CASE("a link that is lost is answered when it is closed, or after its silence", "[ur]") {
+  Playing playing;
+  test::DrivenUr& arm = playing.arm;
+  playing.move(1, 5);
+  static_cast<void>(obey(arm, 1));
+  SECTION("the cable is out") {
+    arm.network.plug(false);
+    static_cast<void>(obey(arm, 0.5));
+    REQUIRE(arm.robot.delays().lost_s);
+    CHECK(*arm.robot.delays().lost_s >= 0.1);
+    CHECK(*arm.robot.delays().lost_s <= 0.1 + kTurnAndReport_s);
+  }
+  SECTION("the program's connection ends") {
+    arm.network.break_control();
+    static_cast<void>(obey(arm, 0.5));
+    const UrDelays& delays = arm.robot.delays();
+    REQUIRE((delays.react_s || delays.lost_s));
+    CHECK(std::max(delays.react_s.value_or(0), delays.lost_s.value_or(0)) <= kTurnAndReport_s);
+  }
+  SECTION("RTDE alone is closed: the program is told to stop in the next turn") {
+    const double before_rad_s = arm.ur.state().qd_rad_s[0];
+    arm.network.break_sessions();
+    static_cast<void>(obey(arm, 0.004 + 2 * 0.008));  // two turns, a cycle until it is read and one to begin
+    REQUIRE(arm.robot.delays().lost_s);
+    CHECK(*arm.robot.delays().lost_s <= kTurnAndReport_s);
+    CHECK(arm.ur.state().qd_rad_s[0] < before_rad_s - 0.01);
+    static_cast<void>(obey(arm, 0.5));
+    CHECK(playing.turned(1) < kStands_rad);
+    CHECK(arm.keys == std::vector{OperatorAction::kPlay});  // that it is there again is no press of Play
+    return;
+  }
+  SECTION("the controller is switched off and on") {
+    arm.ur.robot.reboot();
+    const auto stopped = obey(arm, 0.5);
+    REQUIRE(stopped);
+    REQUIRE(arm.robot.delays().lost_s);
+    CHECK(*arm.robot.delays().lost_s <= 0.1 + kTurnAndReport_s);
+  }
+  static_cast<void>(obey(arm, 1));
+  CHECK(playing.turned(1) < kStands_rad);
+  CHECK_FALSE(arm.robot.move(playing.segment(2, 1), arm.now()));
+}
+
+TEST_CASE("a controller that was switched off and on is met again, and moves after a fresh Play alone", "[ur]") {
+  Playing playing;
+  test::DrivenUr& arm = playing.arm;
+  playing.move(1, 2);
+  arm.run(1);
+  arm.ur.robot.reboot();
+  CHECK(arm.ur.state().timestamp_s < 1e-9);
+  CHECK(playing.turned(12) < 1e-9);
+  arm.run(10);
+  CHECK(arm.robot.rtde().streaming());
+  CHECK(arm.now() - arm.last.stamp < milliseconds(20));  // its clock began anew, ours did not
+  CHECK_FALSE(arm.last.program_running);
+  CHECK(arm.ur.dashboard("play") == "Failed to execute: play");  // no power
+  CHECK(arm.ur.dashboard("brake release") == "Brake releasing");
+  arm.run(3);
+  CHECK(arm.ur.dashboard("load external_control.urp").starts_with("Loading program"));
+  arm.play();
+  CHECK(playing.turned(1) < kStands_rad);
+  CHECK(arm.last.program_running);
+  playing.move(2, 0);
+  arm.run(3);
+  CHECK(arm.last.position_rad[0] == Approx(playing.start_rad[0]).margin(1e-6));
+}
+
+TEST_CASE("a controller's clock that is set does not carry stamps away", "[ur]") {
+  const double by_s = GENERATE(3600.0, -3600.0, 1.0, -1.0, 0.3, -0.3);
+  INFO(by_s);
+  Playing playing;
+  test::DrivenUr& arm = playing.arm;
+  arm.ur.robot.controller().set_clock_forward(by_s);
+  arm.run(0.1);
+  CHECK(arm.last.stamp <= arm.now());
+  arm.run(12);
+  CHECK(arm.last.stamp <= arm.now());
+  CHECK(arm.now() - arm.last.stamp < milliseconds(12));
 }
 
 TEST_CASE("a command that is cut or changed on the way moves nothing and ends the program", "[ur]") {

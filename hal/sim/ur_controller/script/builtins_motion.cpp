@@ -166,6 +166,8 @@ constexpr Builtin kTable[] = {
     {"force_mode_set_damping", "damping", nothing},
     {"force_mode_set_gain_scaling", "scaling", nothing},
     {"freedrive_mode", "freeAxes=[],feature=[]", nothing},
+    {"freedrive_mode_no_incorrect_payload_check", "", nothing},
+    {"get_freedrive_status", "", [](Call& c) { c.answer(std::int64_t{0}); }},
     {"ft_rtde_input_enable", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
     {"movec", "pose_via,pose_to,a=1.2,v=0.25,r=0,mode=0", movec},
     {"movej", "q,a=1.4,v=1.05,t=0,r=0", movej},

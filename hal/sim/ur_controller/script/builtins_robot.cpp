@@ -1,5 +1,6 @@
 // Where the arm is, what it carries, what it could reach.
 #include <algorithm>
+#include <cmath>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
 #include "hal/sim/ur_controller/script/inverse_pose.hpp"
@@ -86,9 +87,21 @@ void set_tcp(Call& c) {
 
 void joint_temperature(Call& c) { c.answer(kJointTemperatures_c[static_cast<std::size_t>(c.integer(0, 0, 5))]); }
 
+/// At the TCP, as `external_force_torque` says (N).
+void force(Call& c) {
+  const Vector6& f = c.robot().external_wrench;
+  c.answer(std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]));
+}
+
+void set_gravity(Call& c) {
+  const Vector3 gravity_m_s2 = c.three(0);
+  if (c.ok()) c.controller().set_gravity(gravity_m_s2);
+}
+
 void nothing(Call&) {}
 
 constexpr Builtin kTable[] = {
+    {"force", "", force},
     {"get_actual_joint_positions", "", joint_positions},
     {"get_actual_joint_positions_history", "steps=0", joint_positions},
     {"get_actual_joint_speeds", "", joint_speeds},
@@ -111,13 +124,18 @@ constexpr Builtin kTable[] = {
     {"get_target_payload", "", [](Call& c) { c.answer(c.robot().payload.mass_kg); }},
     {"get_target_payload_cog", "", payload_center},
     {"get_target_tcp_pose", "", tcp_pose},
+    {"get_target_tcp_pose_along_path", "", tcp_pose},
+    {"get_target_tcp_speed_along_path", "", tcp_speed},
     {"get_target_tcp_speed", "", tcp_speed},
+    {"get_target_waypoint", "", tcp_pose},
     {"get_tcp_force", "", tcp_force},
     {"get_tcp_offset", "", [](Call& c) { c.answer(PoseValue{c.robot().tcp_offset}); }},
     {"is_steady", "", [](Call& c) { c.answer(c.controller().motion().standing()); }},
     {"is_within_safety_limits", "x,qnear=[]", within_limits},
+    {"position_deviation_warning", "enabled,threshold=0.8", nothing},
+    {"reset_revolution_counter", "qNear=[]", nothing},
     {"rtde_set_watchdog", "variable_name,min_frequency,action=\"pause\"", nothing},
-    {"set_gravity", "d", nothing},
+    {"set_gravity", "d", set_gravity},
     {"set_payload", "m,cog=[],inertia=[]", set_payload},
     {"set_payload_cog", "cog", set_payload_center},
     {"set_payload_mass", "m,cog=[],inertia=[]", set_payload},
