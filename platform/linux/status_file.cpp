@@ -23,7 +23,7 @@ StatusFile::StatusFile(std::string_view path) {
 }
 
 StatusFile::~StatusFile() {
-  if (present()) (void)::unlink(path_.data());
+  if (present() && !left_) (void)::unlink(path_.data());
 }
 
 bool StatusFile::write(std::string_view text) const {

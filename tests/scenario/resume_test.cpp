@@ -40,6 +40,47 @@ TEST_CASE("a service that was started without a device leaves no folder; a job t
   CHECK(std::filesystem::exists(folder / ("runs/" + folder.names("runs").front()) / "result.json"));
 }
 
+TEST_CASE("a service that waits records nothing and has no folder before its job", "[scenario]") {
+  JobFolder folder;
+  const std::vector<std::string> service = {"run", "--cell", "empty", "--seed", "1", "--sensor", "fast", "--resume"};
+  const auto with = [&](const char* faults) {
+    std::vector<std::string> words = service;
+    words.insert(words.end(), {"--faults", faults});
+    return words;
+  };
+  const auto job = [&](const char* faults) {
+    const ProgramResult run = folder.run(with(faults));
+    INFO(run.err);
+    CHECK(run.exit_code == 6);
+    const std::vector<std::string> runs = folder.names("runs");
+    REQUIRE(runs.size() == 1);
+    CHECK(runs.front() != "waiting");
+    const std::string journal = "runs/" + runs.front() + "/journal.flj";
+    const auto bytes = std::filesystem::file_size(folder / journal);
+    const ProgramResult replayed = folder.run({"replay", journal});
+    INFO(replayed.err);
+    CHECK(replayed.exit_code == 0);
+    check_safe(folder.read_json("runs/" + runs.front() + "/result.json"));
+    std::filesystem::remove_all(folder / "runs");
+    return bytes;
+  };
+  const auto at_once = job("operator.stop_at=20.5");
+  const auto after_ten_minutes = job("operator.play_at=590.5,operator.stop_at=610.5");
+  CHECK(after_ten_minutes < at_once + 4096);
+
+  // The power is cut in Ready, again and again.
+  folder.options.signal_at = "ready: press Play";
+  folder.options.signal = SIGKILL;
+  for (int i = 0; i < 2; ++i) {
+    std::vector<std::string> words = with("operator.play_at=never");
+    words.emplace_back("--real-time");
+    REQUIRE(folder.run(words).exit_code == 128 + SIGKILL);
+    CHECK(folder.names("runs") == std::vector<std::string>{"waiting"});
+  }
+  folder.options.signal_at.clear();
+  CHECK(job("operator.stop_at=5") > 0);
+}
+
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
   JobFolder folder;
   folder.options.signal_at = "view 6: expecting";
