@@ -39,6 +39,8 @@ class ServiceStatus {
 
   /// Whether anybody is told.
   [[nodiscard]] bool heard() const { return manager_.present() || file_.present(); }
+  /// Whether the file of a start before was left.
+  [[nodiscard]] bool told_before() const { return file_.there(); }
   /// The file stays when the process ends, for those who look while the service is started again.
   void leave_file() { file_.leave(); }
 

@@ -95,10 +95,16 @@ Result<RunFolder> run_folder(const RunCommand& command, const Config& config) {
 void tell_what_is_missing(const Config& config, const Error& error, Narrator& narrator) {
   ServiceStatus status(config.robot.host);
   if (!status.heard()) return;
-  status.state(state_row(StateId::kBoot).name, false);
-  status.text(error.detail());
-  status.fault(error.fault);
-  if (const auto devices = ask_real_devices(config, narrator)) {
+  const auto tell_why = [&] {
+    status.state(state_row(StateId::kBoot).name, false);
+    status.text(error.detail());
+    status.fault(error.fault);
+  };
+  // Asking takes some seconds, in which what a start before has left says more.
+  if (!status.told_before()) tell_why();
+  const auto devices = ask_real_devices(config, narrator);
+  tell_why();
+  if (devices) {
     FixedVector<MissingDevice, 8> missing;
     for (const CheckedDevice& device : *devices) {
       if (device.report.state != hal::DeviceState::kReady && !missing.full())

@@ -26,6 +26,8 @@ StatusFile::~StatusFile() {
   if (present() && !left_) (void)::unlink(path_.data());
 }
 
+bool StatusFile::there() const { return present() && ::access(path_.data(), F_OK) == 0; }
+
 bool StatusFile::write(std::string_view text) const {
   if (!present()) return false;
   const int file = ::open(beside_.data(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);

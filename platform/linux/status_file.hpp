@@ -19,6 +19,8 @@ class StatusFile {
   /// False when it could not be written, or there is no file; the old one stays.
   bool write(std::string_view text) const;
   void leave() { left_ = true; }
+  /// Whether a file is there, this one's or one that was left.
+  [[nodiscard]] bool there() const;
   [[nodiscard]] bool present() const { return path_[0] != '\0'; }
 
  private:

@@ -1,4 +1,6 @@
 /// A power cut after the calibration: the next start says what it has and goes on from there, never by itself.
+#include <stdlib.h>  // NOLINT: setenv is POSIX
+
 #include <csignal>
 
 #include "tests/support/job_run.hpp"
@@ -79,6 +81,30 @@ TEST_CASE("a service that waits records nothing and has no folder before its job
   }
   folder.options.signal_at.clear();
   CHECK(job("operator.stop_at=5") > 0);
+}
+
+TEST_CASE("a service that cannot open its devices names all of them until it is started again", "[scenario]") {
+  const JobFolder folder;
+  folder.write("cart.yaml", R"(robot: {host: 127.0.0.1, port_offset: 21000}
+camera: {device: /dev/no-camera, width: 640, height: 480}
+depth: {device: /nowhere/recording.oni}
+panel: {can_interface: nocan0}
+calibration: {intrinsics: estimate}
+)");
+  std::filesystem::create_directories(folder / "status");
+  setenv("RUNTIME_DIRECTORY", (folder / "status").c_str(), 1);
+  const ProgramResult run = folder.run({"run", "--config", "cart.yaml", "--real-time", "--resume"});
+  unsetenv("RUNTIME_DIRECTORY");
+  CHECK(run.exit_code == 4);
+  const Json status = folder.read_json("status/status.json");
+  CHECK(status["fault"] == 5001);
+  std::vector<std::string> roles;
+  for (const Json& device : status["missing"]) {
+    roles.push_back(device["role"]);
+    CHECK_FALSE(device["remedy"].get<std::string>().empty());
+  }
+  CHECK(roles == std::vector<std::string>{"colour camera", "depth camera", "panel", "arm", "pendant"});
+  CHECK_FALSE(std::filesystem::exists(folder / "runs"));
 }
 
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {
