@@ -1,9 +1,11 @@
 /// What can happen to the machine. Each event has one number on the loop and in the journal.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <variant>
 
 #include "app/machine/job_types.hpp"
@@ -75,6 +77,25 @@ struct ShutdownAsked {
   }
 };
 
+/// The devices that tell of themselves.
+enum class CartDevice : std::uint8_t { kArm, kColorCamera, kDepthCamera, kPanel };
+inline constexpr std::size_t kCartDevices = 4;
+[[nodiscard]] constexpr std::string_view name_of(CartDevice device) {
+  constexpr std::array<std::string_view, kCartDevices> kNames = {"arm", "colour camera", "depth camera", "panel"};
+  return kNames[static_cast<std::size_t>(device)];
+}
+
+/// A device is not there, or not as it must be; or it is again.
+struct DeviceChanged {
+  static constexpr std::uint16_t kKind = 22;
+  CartDevice device = CartDevice::kArm;
+  bool present = true;
+  template <typename Archive>
+  void fields(Archive& a) {
+    a(device, present);
+  }
+};
+
 /// What the machine waits for by time. The number is the timer's on the loop.
 enum class MachineTimer : std::uint32_t { kState = 0, kSettle = 1, kSupervise = 2 };
 
@@ -99,6 +120,6 @@ struct DepthPosed {
 };
 
 using MachineEvent = std::variant<ArmReported, ColorFrameArrived, DepthFrameArrived, OperatorActed, CommandRefused,
-                                  ShutdownAsked, TimerFired, JobCompleted, ColorPosed, DepthPosed>;
+                                  ShutdownAsked, DeviceChanged, TimerFired, JobCompleted, ColorPosed, DepthPosed>;
 
 }  // namespace firstlook

@@ -52,6 +52,8 @@ void Machine::on_event(Instant now, const MachineEvent& event) {
     pending_depth_.push_back(frame->frame);
     pending_depth_.back().stamp = frame->frame.stamp + depth_offset_;
   }
+  if (const auto* changed = std::get_if<DeviceChanged>(&event))
+    absent_.set(static_cast<std::size_t>(changed->device), !changed->present);
   // What was seen on the way is of use, but nobody waits for it: without it the stamps stay as they are.
   if (const auto* done = std::get_if<JobCompleted>(&event); done != nullptr && done->number == way_job_) {
     way_job_ = 0;
@@ -175,6 +177,12 @@ void Machine::remember_arm(const ArmReported& report) {
   arm_ = report.state;
   guardian_margin_m_ = report.guardian_margin_m;
   arm_known_ = true;
+}
+
+void Machine::forget_the_past() {
+  history_size_ = 0;
+  pending_color_.clear();
+  pending_depth_.clear();
 }
 
 std::optional<PosedFrame> Machine::posed(const hal::Frame& frame) const {

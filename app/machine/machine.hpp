@@ -2,6 +2,7 @@
 /// else: no clock, no device, no map. Allocates nothing.
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <optional>
 
@@ -99,8 +100,12 @@ class Machine {
   [[nodiscard]] bool arm_known() const { return arm_known_; }
   /// Where the joints stood during the last `for_s` (below 1 s), their mean; empty when the arm moved or was silent.
   [[nodiscard]] std::optional<JointVector> stood_at(double for_s) const;
+  /// Of what the arm did and the cameras saw nothing is remembered but where the arm is now.
+  void forget_the_past();
   [[nodiscard]] bool color_seen() const { return color_seen_; }
   [[nodiscard]] bool depth_seen() const { return depth_seen_; }
+  /// Devices that are not there, as far as they tell.
+  [[nodiscard]] const std::bitset<kCartDevices>& absent() const { return absent_; }
 
   void transition(StateId target);
   /// Ends the job by way of Park and Report: what is known so far is kept.
@@ -199,6 +204,7 @@ class Machine {
   hal::ArmState arm_;
   double guardian_margin_m_ = 0;
   bool arm_known_ = false, color_seen_ = false, depth_seen_ = false;
+  std::bitset<kCartDevices> absent_;
   /// A second at 125 Hz: what frames on the way need, whose stamps may be off by 0.2 s either way.
   static constexpr std::size_t kArmHistory = 128;
   std::array<hal::ArmState, kArmHistory> history_{};

@@ -53,7 +53,7 @@ constexpr std::array kFromPaused = {Transition{"resume", kLocateBoard},
 
 constexpr std::array kRows = {
     StateRow{kBoot, kNone, "Boot", states::enter_boot, nullptr, states::on_boot, kFromBoot},
-    StateRow{kReady, kNone, "Ready", states::enter_ready, nullptr, states::on_ready, kFromReady},
+    StateRow{kReady, kNone, "Ready", states::enter_ready, states::exit_ready, states::on_ready, kFromReady},
     StateRow{kRunning, kNone, "Running", states::enter_running, nullptr, states::on_running, kFromRunning},
     StateRow{kLocateBoard, kRunning, "LocateBoard", states::enter_locate_board, nullptr, states::on_locate_board,
              kFromLocate},

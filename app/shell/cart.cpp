@@ -69,15 +69,14 @@ std::optional<PlanesRecord> planes_record(std::uint64_t looks, const VoxelMap& m
 }  // namespace
 
 Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions& options, const CellFacts& facts,
-                                         const CartDevices& devices, Narrator& narrator) {
-  auto cart = std::unique_ptr<Cart>(new Cart(config, options, devices, narrator));
+                                         const CartDevices& devices, RunFolder& folder, Narrator& narrator) {
+  auto cart = std::unique_ptr<Cart>(new Cart(config, options, devices, folder, narrator));
   auto bench = Workbench::make(cart->config_, facts, devices.color, devices.depth, *cart->workers_);
   if (!bench) return std::unexpected(bench.error());
   cart->bench_ = std::move(*bench);
-  const std::string folder = std::filesystem::path(options.journal_path).parent_path().string();
-  if (const Status made = make_directories(folder); !made) return std::unexpected(made.error());
-  auto journal =
-      JournalWriter::create_file(options.journal_path, {version_text(), journal_config(cart->config_, options.scope)});
+  if (const Status made = folder.make(); !made) return std::unexpected(made.error());
+  auto journal = JournalWriter::create_file(folder.file("journal.flj"),
+                                            {version_text(), journal_config(cart->config_, options.scope)});
   if (!journal) return std::unexpected(journal.error());
   cart->journal_ = std::move(*journal);
   // The clock starts when all memory is taken: the devices' time is the loop's.
@@ -92,8 +91,9 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   cart->loop_.reset(new EventLoop(*cart->clock_, cart->journal_.get(), *cart, cart->timers_, *cart->runner_));
   cart->arm_source_.emplace(devices.arm, cart->bench_->arm(), cart->bench_->published());
   // The arm first: whatever else comes in the same turn finds its newest report.
-  EventSource* const sources[] = {&*cart->arm_source_,    &cart->color_source_, &cart->depth_source_,
-                                  &cart->pendant_source_, &cart->panel_source_, &cart->host_};
+  EventSource* const sources[] = {
+      &*cart->arm_source_,  &cart->color_source_,  &cart->depth_source_, &cart->pendant_source_,
+      &cart->panel_source_, &cart->device_source_, &cart->host_};
   for (EventSource* source : sources) cart->loop_->add_source(*source);
   cart->loop_->set_watchdog(cart->status_.watchdog());
   cart->machine_.emplace(machine_settings(cart->config_, options.scope), cart->decisions_);
@@ -103,10 +103,12 @@ Result<std::unique_ptr<Cart>> Cart::make(const Config& config, const CartOptions
   return cart;
 }
 
-Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& devices, Narrator& narrator)
+Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& devices, RunFolder& folder,
+           Narrator& narrator)
     : config_(config),
       options_(options),
       devices_(devices),
+      folder_(folder),
       narrator_(narrator),
       workers_(std::make_unique<WorkerPool>(config.workers)),
       status_(config.cell),
@@ -114,6 +116,7 @@ Cart::Cart(const Config& config, const CartOptions& options, const CartDevices& 
       depth_source_(devices.depth),
       pendant_source_(devices.pendant, OperatorDevice::kPendant),
       panel_source_(devices.panel, OperatorDevice::kPanel),
+      device_source_(devices.telling),
       decisions_(*this, this),
       started_(utc_date_text()),
       wall_start_s_(static_cast<double>(monotonic_ns()) * 1e-9) {}
@@ -133,6 +136,11 @@ Status Cart::run() {
   job_heap_peak_bytes_ = runner_->counters().heap_peak_bytes;
   runner_.reset();  // waits for a job that still works on what the record is made of
   status_.ending(seconds(kEndingWithin_s));
+  if (began_) {
+    status_.text("writing the report");
+  } else {
+    status_.leave_file();  // why it came to nothing, until it is started again
+  }
   if (checkpoint_failure_) {
     narrator_.line(fmt::format("warning   no checkpoint of the calibration: {}", describe(*checkpoint_failure_)),
                    Priority::kWarning);
@@ -142,6 +150,21 @@ Status Cart::run() {
 }
 
 // ---- events
+
+/// In Ready the machine remembers of reports and frames no more than the newest report (exit_ready): one that decides
+/// nothing is not needed for a replay, and a service may wait for weeks.
+Worth Cart::worth(const Event& event) const {
+  if (machine_->state() != StateId::kReady) return Worth::kRecord;
+  switch (event.kind) {
+    case ArmReported::kKind:
+      return Worth::kHoldAsBasis;
+    case ColorFrameArrived::kKind:
+    case DepthFrameArrived::kKind:
+      return Worth::kHold;
+    default:
+      return Worth::kRecord;
+  }
+}
 
 void Cart::on_event(const Event& event) {
   const auto machine_event = decode_event(event.kind, event.bytes());
@@ -169,7 +192,26 @@ void Cart::end_of_turn(Instant now) {
     }
     if (now.seconds() > options_.virtual_time_max_s) host_.ask_shutdown(Fault::kTookTooLong);
   }
+  if (device_source_.take_news()) tell_devices(now);
   if (ended_) loop_->stop();
+}
+
+void Cart::tell_devices(Instant now) {
+  FixedVector<MissingDevice, kCartDevices> missing;
+  for (const ToldDevice& device : device_source_.told()) {
+    if (device.absent) missing.push_back({name_of(device.device), &device.report});
+  }
+  status_.missing({missing.data(), missing.size()});
+  for (const ToldDevice& device : device_source_.told()) {
+    if (!device.changed) continue;
+    const hal::DeviceReport& report = device.report;
+    std::array<char, 640> line;
+    const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s]   {} {} {}: {}{}{}", now.seconds(),
+                                      name_of(device.device), report.device.view(), hal::name_of(report.state),
+                                      report.detail.view(), report.remedy.empty() ? "" : ". ", report.remedy.view());
+    narrator_.line({line.data(), std::min(end.size, line.size())},
+                   device.absent ? Priority::kWarning : Priority::kInfo);
+  }
 }
 
 // ---- decisions
@@ -178,7 +220,19 @@ void Cart::decision(DecisionKind kind, Instant now, std::span<const std::byte> b
   journal_->decision(static_cast<std::uint16_t>(kind), now, bytes);
 }
 
+void Cart::begin_job(Instant now) {
+  began_ = true;
+  const Status begun = folder_.begin();
+  if (begun) return;
+  std::array<char, 320> line;
+  const auto end = fmt::format_to_n(line.data(), line.size(), "[{:7.1f} s]   the run's folder cannot get its name: {}",
+                                    now.seconds(), begun.error().detail());
+  narrator_.line({line.data(), std::min(end.size, line.size())}, Priority::kError);
+  host_.ask_shutdown(begun.error().fault);
+}
+
 void Cart::state_entered(Instant now, StateId state) {
+  if (!began_ && is_within(state, StateId::kRunning)) begin_job(now);
   if (!is_phase(state)) return;
   status_.state(state_row(state).name, state == StateId::kReady);
   if (!phases_.empty() && !ended_) phases_.back().end = now;
@@ -206,8 +260,8 @@ void Cart::start_job(Instant now, JobKind kind, std::uint32_t number, std::span<
 void Cart::checkpoint_calibration() {
   RunRecord record;
   fill_calibration(record);
-  const std::string folder = std::filesystem::path(options_.journal_path).parent_path().string();
-  if (const Status written = write_checkpoint(folder, calibration_of_run(record)); !written)
+  folder_.sync();
+  if (const Status written = write_checkpoint(folder_.path(), calibration_of_run(record)); !written)
     checkpoint_failure_ = written.error();
 }
 

@@ -11,7 +11,9 @@
 #include "app/report/run_files.hpp"
 #include "app/report/run_record.hpp"
 #include "app/shell/decision_log.hpp"
+#include "app/shell/device_source.hpp"
 #include "app/shell/device_sources.hpp"
+#include "app/shell/run_folder.hpp"
 #include "app/shell/service_status.hpp"
 #include "platform/journal/journal.hpp"
 #include "platform/linux/terminal.hpp"
@@ -25,12 +27,12 @@ struct CartDevices {
   hal::DepthCamera& depth;
   hal::Pendant& pendant;
   hal::Panel& panel;
+  TellingDevices telling{};  ///< those that tell of themselves
 };
 
 struct CartOptions {
   RunScope scope = RunScope::kEverything;
   bool real_time = false;
-  std::string journal_path;
   // In virtual time nobody is there to lose patience.
   double virtual_time_max_s = 3 * 3600;  ///< a job that takes longer is stopped
   double virtual_wait_max_s = 600;       ///< for Play
@@ -51,9 +53,10 @@ struct MotionStop {
 class Cart final : private DecisionSink, private EventHandler, private DecisionLog {
  public:
   /// Takes all memory. Errors: those of Workbench::make and JournalWriter::create_file.
+  /// @param folder  of the run, for its journal and checkpoint; outlives the cart
   [[nodiscard]] static Result<std::unique_ptr<Cart>> make(const Config& config, const CartOptions& options,
                                                           const CellFacts& facts, const CartDevices& devices,
-                                                          Narrator& narrator);
+                                                          RunFolder& folder, Narrator& narrator);
   ~Cart() override;
 
   /// Boots, seals the memory, runs the job to its end. Errors: that of the loop (nothing is due any more), kDiskWrite
@@ -71,7 +74,8 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   [[nodiscard]] const Ending& ending() const { return ending_; }
 
  private:
-  Cart(const Config& config, const CartOptions& options, const CartDevices& devices, Narrator& narrator);
+  Cart(const Config& config, const CartOptions& options, const CartDevices& devices, RunFolder& folder,
+       Narrator& narrator);
 
   // DecisionSink: carries out.
   void state_entered(Instant now, StateId state) override;
@@ -88,9 +92,14 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   // DecisionLog: records.
   void decision(DecisionKind kind, Instant now, std::span<const std::byte> bytes) override;
   // EventHandler
+  [[nodiscard]] Worth worth(const Event& event) const override;
   void on_event(const Event& event) override;
   void end_of_turn(Instant now) override;
 
+  /// The first state behind Ready.
+  void begin_job(Instant now);
+  /// What a device said has changed: for the status, and in words.
+  void tell_devices(Instant now);
   /// On the job's thread, before the machine hears of it: from here on a power cut does not lose the calibration.
   void checkpoint_calibration();
   void submit(JobKind kind, std::uint32_t number, std::span<const std::byte> arguments, Instant now);
@@ -108,6 +117,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   Config config_;
   CartOptions options_;
   CartDevices devices_;
+  RunFolder& folder_;
   Narrator& narrator_;
   std::unique_ptr<Clock> clock_;
   std::unique_ptr<WorkerPool> workers_;
@@ -123,6 +133,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   FrameSource<DepthFrameArrived> depth_source_;
   OperatorSource<hal::Pendant> pendant_source_;
   OperatorSource<hal::Panel> panel_source_;
+  DeviceSource device_source_;
   HostSource host_;
   LoggedDecisions decisions_;
   std::optional<Machine> machine_;
@@ -134,7 +145,7 @@ class Cart final : private DecisionSink, private EventHandler, private DecisionL
   FixedVector<PhasePassed, 128> phases_;
   FixedVector<MotionStop, 128> stops_;
   Ending ending_{Outcome::kFaulted, true, Fault::kInternal};
-  bool ended_ = false;
+  bool began_ = false, ended_ = false;
   double stall_s_ = 0;
   Instant waited_until_{};
   bool arm_moves_ = false;

@@ -49,6 +49,12 @@ std::optional<MachineEvent> decode_event(std::uint16_t kind, std::span<const std
       return as<CommandRefused>(bytes);
     case ShutdownAsked::kKind:
       return as<ShutdownAsked>(bytes);
+    case DeviceChanged::kKind: {
+      const auto changed = as<DeviceChanged>(bytes);
+      const auto* device = changed ? std::get_if<DeviceChanged>(&*changed) : nullptr;
+      const bool known = device != nullptr && static_cast<std::size_t>(device->device) < kCartDevices;
+      return known ? changed : std::nullopt;
+    }
     default:
       return std::nullopt;
   }

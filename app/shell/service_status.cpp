@@ -63,12 +63,32 @@ void ServiceStatus::fault(Fault fault) {
   publish();
 }
 
+void ServiceStatus::missing(std::span<const MissingDevice> devices) {
+  std::size_t used = 0;
+  for (const MissingDevice& device : devices) {
+    std::array<char, 96> which{};
+    std::array<char, 240> what{}, remedy{};
+    take(device.report->device, which);
+    take(device.report->detail, what);
+    take(device.report->remedy, remedy);
+    const std::size_t room = missing_.size() - used;
+    const auto end = fmt::format_to_n(missing_.data() + used, room,
+                                      "{}{{\"role\": \"{}\", \"device\": \"{}\", \"state\": \"{}\", \"what\": \"{}\", "
+                                      "\"remedy\": \"{}\"}}",
+                                      used == 0 ? "" : ", ", device.role, which.data(),
+                                      hal::name_of(device.report->state), what.data(), remedy.data());
+    if (end.size >= room) break;  // half an element is none
+    used += end.size;
+  }
+  missing_[used] = '\0';
+  publish();
+}
+
 void ServiceStatus::ending(Duration allowed) {
   std::array<char, 64> message;
   const auto end = fmt::format_to_n(message.data(), message.size(), "WATCHDOG_USEC={}",
                                     static_cast<std::int64_t>(allowed.seconds() * 1e6));
   (void)manager_.send({message.data(), std::min(end.size, message.size())});
-  text("writing the report");
 }
 
 void ServiceStatus::publish() {
@@ -78,11 +98,12 @@ void ServiceStatus::publish() {
     (void)manager_.send({message.data(), std::min(end.size, message.size())});
   }
   if (!file_.present()) return;
-  std::array<char, 1024> json;
-  const auto end = fmt::format_to_n(json.data(), json.size(),
-                                    "{{\"state\": \"{}\", \"text\": \"{}\", \"fault\": {}, \"works_on\": \"{}\", "
-                                    "\"started\": \"{}\", \"pid\": {}}}\n",
-                                    state_.data(), text_.data(), fault_, works_on_, started_, getpid());
+  std::array<char, 1024 + std::tuple_size_v<decltype(missing_)>> json;
+  const auto end =
+      fmt::format_to_n(json.data(), json.size(),
+                       "{{\"state\": \"{}\", \"text\": \"{}\", \"fault\": {}, \"works_on\": \"{}\", "
+                       "\"started\": \"{}\", \"pid\": {}, \"missing\": [{}]}}\n",
+                       state_.data(), text_.data(), fault_, works_on_, started_, getpid(), missing_.data());
   if (end.size <= json.size()) (void)file_.write({json.data(), end.size});
 }
 

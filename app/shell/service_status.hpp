@@ -4,15 +4,22 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
+#include "hal/api/device_report.hpp"
 #include "platform/core/fault_table.hpp"
 #include "platform/core/time.hpp"
 #include "platform/linux/notify.hpp"
 #include "platform/linux/status_file.hpp"
 
 namespace firstlook {
+
+struct MissingDevice {
+  std::string_view role;  ///< "colour camera"
+  const hal::DeviceReport* report = nullptr;
+};
 
 /// After construction nothing here allocates or blocks.
 class ServiceStatus {
@@ -25,8 +32,17 @@ class ServiceStatus {
   void state(std::string_view name, bool ready);
   void text(std::string_view line);
   void fault(Fault fault);
-  /// The loop has ended and feeds no watchdog; files are being written, for which the manager allows this long.
+  /// The devices that are not there, all of them.
+  void missing(std::span<const MissingDevice> devices);
+  /// The loop has ended and feeds no watchdog; the manager allows this long for what is left to do.
   void ending(Duration allowed);
+
+  /// Whether anybody is told.
+  [[nodiscard]] bool heard() const { return manager_.present() || file_.present(); }
+  /// Whether the file of a start before was left.
+  [[nodiscard]] bool told_before() const { return file_.there(); }
+  /// The file stays when the process ends, for those who look while the service is started again.
+  void leave_file() { file_.leave(); }
 
   /// To be fed by the loop; null when nobody asked for it.
   [[nodiscard]] Watchdog* watchdog() { return watchdog_ ? &*watchdog_ : nullptr; }
@@ -41,6 +57,7 @@ class ServiceStatus {
   std::string started_;
   std::array<char, 32> state_{};
   std::array<char, 160> text_{};
+  std::array<char, 4096> missing_{};  ///< the elements of a JSON array
   int fault_ = 0;
   bool told_ready_ = false;
 };

@@ -127,13 +127,15 @@ Result<ArmModel> NetworkArm::measure(const ur::RobotIdentity& robot, const Confi
 hal::DeviceReport NetworkArm::report(Instant) const {
   const ur::RobotIdentity& robot = robot_->identity();
   const ur::RtdeClient& rtde = robot_->robot().rtde();
+  const auto newest = robot_->robot().newest_report();
+  const int mode = newest ? newest->robot_mode : robot.robot_mode;
   hal::DeviceReport report;
   report.state = rtde.streaming() ? hal::DeviceState::kReady : hal::DeviceState::kStarting;
   report.device.set("{} at {}", robot.arm_name(), host_);
   report.detail.set("software {}.{}.{}, serial number {}, factory kinematics {:08x}, {}", robot.version.major,
                     robot.version.minor, robot.version.bugfix, robot.serial_number(), robot.kinematics.checksums[0],
-                    ur::robot_mode_name(robot.robot_mode));
-  if (robot.robot_mode != ur::kRobotModeRunning) {
+                    ur::robot_mode_name(mode));
+  if (mode != ur::kRobotModeRunning) {
     report.state = hal::DeviceState::kUnsuitable;
     report.remedy.set("Switch the robot on at the pendant and release its brakes: firstlook never does that.");
   } else if (rtde.trouble()) {

@@ -188,17 +188,24 @@ Status open_kinect(const Config& config, RealDevices& devices) {
   auto made = freenect::Kinect::make(kernel(), *options);
   if (!made) return std::unexpected(made.error());
   const std::shared_ptr<freenect::Kinect> kinect = std::move(*made);
-  if (options->usb.color) devices.color = &kinect->color();
-  if (options->usb.depth) devices.depth = &kinect->depth();
+  if (options->usb.color) {
+    devices.color = &kinect->color();
+    devices.telling.push_back({CartDevice::kColorCamera, &kinect->color_report()});
+  }
+  if (options->usb.depth) {
+    devices.depth = &kinect->depth();
+    devices.telling.push_back({CartDevice::kDepthCamera, &kinect->depth_report()});
+  }
   devices.owned.push_back(kinect);
   return {};
 }
 
 /// Takes what was made, or its error.
 template <typename Device, typename Interface>
-Status take(Result<std::unique_ptr<Device>> made, Interface*& place, RealDevices& devices) {
+Status take(CartDevice which, Result<std::unique_ptr<Device>> made, Interface*& place, RealDevices& devices) {
   if (!made) return std::unexpected(made.error());
   place = made->get();
+  devices.telling.push_back({which, made->get()});
   devices.owned.push_back(std::shared_ptr<Device>(std::move(*made)));
   return {};
 }
@@ -217,25 +224,28 @@ Result<RealDevices> open_real_devices(const Config& config) {
   if (devices.color == nullptr) {
     const auto intrinsics = intrinsics_of(config.camera.info, config.camera.width, config.camera.height);
     if (!intrinsics) return std::unexpected(intrinsics.error());
-    const Status opened = take(make_v4l2(config, *intrinsics), devices.color, devices);
+    const Status opened = take(CartDevice::kColorCamera, make_v4l2(config, *intrinsics), devices.color, devices);
     if (!opened) return std::unexpected(opened.error());
   }
   if (devices.depth == nullptr) {
     const auto options = depth_options(config.depth);
     if (!options) return std::unexpected(options.error());
-    const Status opened = take(openni::OpenNiDepth::make(kernel(), *options), devices.depth, devices);
+    const Status opened =
+        take(CartDevice::kDepthCamera, openni::OpenNiDepth::make(kernel(), *options), devices.depth, devices);
     if (!opened) return std::unexpected(opened.error());
   }
   auto panel = open_panel(config);
   if (!panel) return std::unexpected(panel.error());
-  if (!*panel) *panel = std::make_shared<NoPanel>();
-  devices.panel = panel->get();
-  devices.owned.push_back(std::move(*panel));
+  if (!panel->panel) panel->panel = std::make_shared<NoPanel>();
+  devices.panel = panel->panel.get();
+  for (const TellingDevice& device : panel->telling) devices.telling.push_back(device);
+  devices.owned.push_back(std::move(panel->panel));
   return devices;
 }
 
-Result<std::shared_ptr<hal::Panel>> open_panel(const Config& config) {
-  if (config.panel.can_interface == "none") return nullptr;
+Result<OpenedPanel> open_panel(const Config& config) {
+  OpenedPanel opened;
+  if (config.panel.can_interface == "none") return opened;
   {
     const DeviceCheck asked = panel_check(config);
     RealClock clock;
@@ -246,7 +256,10 @@ Result<std::shared_ptr<hal::Panel>> open_panel(const Config& config) {
     }
   }
   // Another one for the job: the clock of a job begins anew.
-  return make_panel(config);
+  std::shared_ptr<can::CanPanel> panel = make_panel(config);
+  opened.telling.push_back({CartDevice::kPanel, panel.get()});
+  opened.panel = std::move(panel);
+  return opened;
 }
 
 Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {

@@ -7,15 +7,16 @@
 
 #include "app/check/device_check.hpp"
 #include "app/config/config.hpp"
+#include "app/shell/device_source.hpp"
 
 namespace firstlook {
 
 /// Roles of devices in words, as `firstlook check` lists them.
-inline constexpr std::string_view kArmRole = "arm";
-inline constexpr std::string_view kColorRole = "colour camera";
-inline constexpr std::string_view kDepthRole = "depth camera";
+inline constexpr std::string_view kArmRole = name_of(CartDevice::kArm);
+inline constexpr std::string_view kColorRole = name_of(CartDevice::kColorCamera);
+inline constexpr std::string_view kDepthRole = name_of(CartDevice::kDepthCamera);
 inline constexpr std::string_view kPendantRole = "pendant";
-inline constexpr std::string_view kPanelRole = "panel";
+inline constexpr std::string_view kPanelRole = name_of(CartDevice::kPanel);
 
 /// Whether the configuration names any.
 [[nodiscard]] bool names_real_devices(const Config& config);
@@ -26,6 +27,7 @@ struct RealDevices {
   hal::ColorCamera* color = nullptr;
   hal::DepthCamera* depth = nullptr;
   hal::Panel* panel = nullptr;
+  TellingDevices telling;
   std::vector<std::shared_ptr<void>> owned;
 };
 
@@ -35,7 +37,11 @@ struct RealDevices {
 
 /// The panel alone; null where the configuration names none. Asks it first, which takes a second: its Stop must work
 /// before anything moves. Error: kDeviceMissing when it does not answer, or not as the configuration says.
-[[nodiscard]] Result<std::shared_ptr<hal::Panel>> open_panel(const Config& config);
+struct OpenedPanel {
+  std::shared_ptr<hal::Panel> panel;
+  TellingDevices telling;
+};
+[[nodiscard]] Result<OpenedPanel> open_panel(const Config& config);
 
 /// A check of each device that the configuration names; one that cannot even be made says why. Errors: those of a
 /// camera_info.yaml that is named: kDataMissing, kDataMalformed, kConfigBadValue for one of another size.

@@ -23,10 +23,13 @@ class RealSite final : public JobSite {
   RealSite(std::unique_ptr<NetworkArm> arm, RealDevices devices, const Config& config)
       : arm_(std::move(arm)),
         devices_(std::move(devices)),
-        facts_{config.parking_rad.value(), mounted(config.depth), {}, arm_->model()} {}
+        telling_(devices_.telling),
+        facts_{config.parking_rad.value(), mounted(config.depth), {}, arm_->model()} {
+    telling_.push_back({CartDevice::kArm, arm_.get()});
+  }
 
   CartDevices devices() override {
-    return {arm_->arm(), *devices_.color, *devices_.depth, arm_->pendant(), *devices_.panel};
+    return {arm_->arm(), *devices_.color, *devices_.depth, arm_->pendant(), *devices_.panel, telling_};
   }
   CellFacts facts() const override { return facts_; }
   bool in_real_time() const override { return true; }
@@ -38,6 +41,7 @@ class RealSite final : public JobSite {
  private:
   std::unique_ptr<NetworkArm> arm_;
   RealDevices devices_;
+  TellingDevices telling_;
   CellFacts facts_;
 };
 

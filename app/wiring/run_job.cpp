@@ -16,6 +16,7 @@
 #include "app/shell/job_settings.hpp"
 #include "app/shell/narrate_result.hpp"
 #include "app/wiring/job_site.hpp"
+#include "app/wiring/run_check.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
@@ -56,9 +57,9 @@ struct Booted {
 };
 
 Result<Booted> boot(const Config& config, const CartOptions& options, const CellFacts& facts, JobSite& site,
-                    Narrator& narrator) {
+                    RunFolder& folder, Narrator& narrator) {
   const memory::JobHeapScope heap(memory::kHeapUncapped);
-  auto made = Cart::make(config, options, facts, site.devices(), narrator);
+  auto made = Cart::make(config, options, facts, site.devices(), folder, narrator);
   if (!made) return std::unexpected(made.error());
   return Booted{std::move(*made), heap.outstanding_bytes()};
 }
@@ -83,6 +84,44 @@ Status write_run(const RunCommand& command, const Config& config, const std::str
   return {};
 }
 
+/// A service that waits for its job has a folder only when it begins.
+Result<RunFolder> run_folder(const RunCommand& command, const Config& config) {
+  if (!command.out.empty()) return RunFolder::named(command.out);
+  if (command.resume) return RunFolder::waiting(kRunsFolder, config.seed);
+  return RunFolder::named(fmt::format("{}/{}-{}", kRunsFolder, utc_date_for_name(), config.seed));
+}
+
+/// A service that cannot be opened says so until it is started again: why, and of every device what it needs.
+void tell_what_is_missing(const Config& config, const Error& error, Narrator& narrator) {
+  ServiceStatus status(config.robot.host);
+  if (!status.heard()) return;
+  const auto tell_why = [&] {
+    status.state(state_row(StateId::kBoot).name, false);
+    status.text(error.detail());
+    status.fault(error.fault);
+  };
+  // Asking takes some seconds, in which what a start before has left says more.
+  if (!status.told_before()) tell_why();
+  const auto devices = ask_real_devices(config, narrator);
+  tell_why();
+  if (devices) {
+    FixedVector<MissingDevice, 8> missing;
+    for (const CheckedDevice& device : *devices) {
+      if (device.report.state != hal::DeviceState::kReady && !missing.full())
+        missing.push_back({device.role, &device.report});
+    }
+    status.missing({missing.data(), missing.size()});
+  }
+  status.leave_file();
+}
+
+Result<std::unique_ptr<JobSite>> open_site(const RunCommand& command, Config& config, Narrator& narrator) {
+  if (!names_real_cart(config)) return open_simulated_site(command, config, narrator);
+  auto site = open_real_site(command, config, narrator);
+  if (!site) tell_what_is_missing(config, site.error(), narrator);
+  return site;
+}
+
 std::string where(const RunCommand& command, const LoadedConfig& loaded) {
   const Config& config = loaded.config;
   if (names_real_cart(config)) return fmt::format("running on the real cart, robot {}", config.robot.host);
@@ -105,12 +144,9 @@ int run_job(const RunCommand& command) {
   if (!stored) return fail(stored.error());
   std::optional<CutOffRun> resumed = run_to_resume(command, narrator);
   if (resumed) *stored = resumed->calibration;
-  const std::string folder =
-      command.out.empty() ? fmt::format("{}/{}-{}", kRunsFolder, utc_date_for_name(), config.seed) : command.out;
-  if (const Status fresh = check_run_folder(folder); !fresh) return fail(fresh.error());
-
-  auto opened = names_real_cart(config) ? open_real_site(command, config, narrator)
-                                        : open_simulated_site(command, config, narrator);
+  auto folder = run_folder(command, config);
+  if (!folder) return fail(folder.error());
+  auto opened = open_site(command, config, narrator);
   if (!opened) return fail(opened.error());
   JobSite& site = **opened;
   if (const Status standing = memory::account_standing_rows(); !standing) return fail(standing.error());
@@ -119,15 +155,14 @@ int run_job(const RunCommand& command) {
   CartOptions options;
   options.scope = resumed ? RunScope::kMap : command.scope;
   options.real_time = command.real_time || site.in_real_time();
-  options.journal_path = folder + "/journal.flj";
-  auto booted = boot(config, options, facts, site, narrator);
+  auto booted = boot(config, options, facts, site, *folder, narrator);
   if (!booted && resumed && booted.error().fault == Fault::kStoredCalibration) {
     narrator.line(fmt::format("not taken up: {}", describe(booted.error())), Priority::kWarning);
     remove_checkpoint(resumed->folder);
     resumed.reset();
     facts.stored.reset();
     options.scope = command.scope;
-    booted = boot(config, options, facts, site, narrator);
+    booted = boot(config, options, facts, site, *folder, narrator);
   }
   if (!booted) return fail(booted.error());
   Cart& cart = *booted->cart;
@@ -141,18 +176,19 @@ int run_job(const RunCommand& command) {
   site.finish(cart, config, record, narrator);
   record.wall.boot_heap_bytes = static_cast<std::uint64_t>(std::max<std::int64_t>(0, booted->heap_bytes));
   record.provenance.sensor = command.fast_sensor ? "fast" : "full";
-  record.wall.folder = folder;
+  record.wall.folder = folder->path();
   narrate_result(record, narrator);
   // A service is started again and again, also where a device is missing for days: only jobs leave folders behind.
   if (command.resume && command.out.empty() && !job_began(record)) {
     std::error_code left;
-    std::filesystem::remove_all(folder, left);
+    std::filesystem::remove_all(folder->path(), left);
     return ran ? exit_code_of(cart.ending()) : exit_code_of(ran.error());
   }
-  if (const Status written = write_run(command, config, folder, cart, record); !written) return fail(written.error());
+  if (const Status written = write_run(command, config, folder->path(), cart, record); !written)
+    return fail(written.error());
   // Taken up and brought to its end; one that was stopped is offered again.
   if (resumed && record.outcome != Outcome::kSafelyStopped) remove_checkpoint(resumed->folder);
-  narrator.line(fmt::format("report    {}/report.html", folder));
+  narrator.line(fmt::format("report    {}", folder->file("report.html")));
   if (command.json) std::printf("%s", result_json(record).c_str());
   return ran ? exit_code_of(cart.ending()) : exit_code_of(ran.error());
 }

@@ -10,14 +10,17 @@ namespace {
 
 class SimulatedSite final : public JobSite {
  public:
-  SimulatedSite(std::unique_ptr<CellRobot> robot, std::unique_ptr<sim::SimulatedCell> cell,
-                std::shared_ptr<hal::Panel> panel)
-      : robot_(std::move(robot)), cell_(std::move(cell)), panel_(std::move(panel)) {}
+  SimulatedSite(std::unique_ptr<CellRobot> robot, std::unique_ptr<sim::SimulatedCell> cell, OpenedPanel panel)
+      : robot_(std::move(robot)), cell_(std::move(cell)), panel_(std::move(panel.panel)), telling_(panel.telling) {}
   ~SimulatedSite() override { cell_->grader().watch(nullptr); }
 
   CartDevices devices() override {
-    return {robot_ ? robot_->arm() : cell_->arm(), cell_->color(), cell_->depth(),
-            robot_ ? robot_->pendant() : cell_->pendant(), panel_ ? *panel_ : cell_->panel()};
+    return {robot_ ? robot_->arm() : cell_->arm(),
+            cell_->color(),
+            cell_->depth(),
+            robot_ ? robot_->pendant() : cell_->pendant(),
+            panel_ ? *panel_ : cell_->panel(),
+            telling_};
   }
   CellFacts facts() const override {
     const sim::CellDescription& cell = cell_->description();
@@ -39,6 +42,7 @@ class SimulatedSite final : public JobSite {
   std::unique_ptr<CellRobot> robot_;  ///< moves the arm; null: the cell's own does
   std::unique_ptr<sim::SimulatedCell> cell_;
   std::shared_ptr<hal::Panel> panel_;  ///< a real one in place of the cell's
+  TellingDevices telling_;
   std::optional<KnownFree> known_free_;
 };
 

@@ -5,7 +5,8 @@
 namespace firstlook::can {
 namespace {
 
-constexpr Duration kTurn = milliseconds(5);  // finer than any debouncing, and 20 turns to a heartbeat
+constexpr Duration kTurn = milliseconds(5);       // finer than any debouncing
+constexpr Duration kQuietTurn = milliseconds(8);  // while nothing bounces: 12 turns to a heartbeat
 
 std::uint64_t bit(int number) { return number < 0 ? 0 : std::uint64_t{1} << number; }
 
@@ -110,7 +111,11 @@ std::optional<hal::OperatorEvent> CanPanel::poll(Instant now) {
   return event;
 }
 
-Instant CanPanel::next_due() const { return events_.empty() ? last_turn_ + kTurn : last_turn_; }
+Instant CanPanel::next_due() const {
+  if (!events_.empty()) return last_turn_;
+  const bool quiet = io_.operational() && !start_.bouncing() && !confirm_.bouncing();
+  return last_turn_ + (quiet ? kQuietTurn : kTurn);
+}
 
 void CanPanel::light(hal::Light light) {
   if (light == hal::Light::kRed && light_ != light) buzz_asked_ = true;

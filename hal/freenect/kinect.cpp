@@ -10,7 +10,7 @@ namespace firstlook::freenect {
 namespace {
 
 constexpr int kWait_ms = 100;
-constexpr Duration kRetry = milliseconds(3);  // of the loop, between looks for a frame
+constexpr Duration kRetry = milliseconds(8);  // of the loop, between looks for a frame: a turn of the arm
 constexpr double kDepthRate_hz = 30, kColorRate_hz = 15;
 
 // The thesis of 2014: depth has 57 by 43 degrees; its own calibration of a Kinect's colour camera at 640 x 480.

@@ -9,7 +9,7 @@ namespace firstlook::openni {
 namespace {
 
 constexpr int kWait_ms = 100;
-constexpr Duration kRetry = milliseconds(3);  // between looks for a frame that is due
+constexpr Duration kRetry = milliseconds(8);  // of the loop, for what the thread left: a turn of the arm
 constexpr std::size_t kPixelBytes = 2;
 
 /// A pinhole with the field of view that a device states: its picture is that wide at the outer edges of its pixels.

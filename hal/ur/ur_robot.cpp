@@ -248,9 +248,12 @@ hal::ArmState UrRobot::state_of(const RtdeReport& report) const {
 }
 
 std::optional<hal::ArmState> UrRobot::poll(Instant now) {
+  // Asked again in the same turn, whether more reports have come, it does not ask the program's side once more.
+  if (now != polled_ || !heard_) {
+    hear_program(now);
+    note_end_of_program(now);
+  }
   polled_ = now;
-  hear_program(now);
-  note_end_of_program(now);
   const bool was_streaming = rtde_.streaming();
   const auto report = rtde_.poll(now);
   if (was_streaming && !rtde_.streaming() && rtde_.trouble()) tell(rtde_.trouble()->detail());
@@ -261,6 +264,12 @@ std::optional<hal::ArmState> UrRobot::poll(Instant now) {
   if (cut_ && playing() && now - *cut_ > kProgramEnd) return std::nullopt;
   ++counters_.states;
   return state_of(*report);
+}
+
+/// Without a program on the robot all that is awaited is a report every 8 ms; a program that knocks can wait so long.
+Instant UrRobot::next_due() const {
+  const Instant soon = polled_ + kPoll;
+  return rtde_.streaming() && heard_ && !program_.up() ? std::max(soon, *heard_ + kPause) : soon;
 }
 
 // ---- hal::RobotArm

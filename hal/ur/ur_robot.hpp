@@ -39,7 +39,8 @@ struct UrDelays {
 /// the program or of a connection; what comes after asks for a new one.
 class UrRobot final : public hal::RobotArm {
  public:
-  static constexpr Duration kPoll = milliseconds(2);  ///< how often the network is looked at
+  static constexpr Duration kPoll = milliseconds(2);   ///< how often the network is looked at
+  static constexpr Duration kPause = milliseconds(7);  ///< after a report, where nothing but the next one can come
   static constexpr double kReports_hz = 125;
   static constexpr Duration kStale = milliseconds(100);   ///< joints older than that: the link counts as lost
   static constexpr Duration kAccept = milliseconds(500);  ///< of a segment by the program
@@ -58,7 +59,7 @@ class UrRobot final : public hal::RobotArm {
 
   [[nodiscard]] const char* model() const override { return model_.data(); }
   [[nodiscard]] std::optional<hal::ArmState> poll(Instant now) override;
-  [[nodiscard]] Instant next_due() const override { return polled_ + kPoll; }
+  [[nodiscard]] Instant next_due() const override;
   [[nodiscard]] Status move(const hal::Segment& segment, Instant now) override;
   void stop(Instant now) override;
   [[nodiscard]] hal::ArmCounters counters() const override { return counters_; }
@@ -67,6 +68,10 @@ class UrRobot final : public hal::RobotArm {
   [[nodiscard]] hal::Pendant& pendant() { return pendant_; }
 
   [[nodiscard]] const RtdeClient& rtde() const { return rtde_; }
+  /// The controller's newest report; empty before the first.
+  [[nodiscard]] std::optional<RtdeReport> newest_report() const {
+    return heard_ ? std::optional(report_) : std::nullopt;
+  }
   [[nodiscard]] const ProgramLink& program() const { return program_; }
   [[nodiscard]] const UrDelays& delays() const { return delays_; }
 

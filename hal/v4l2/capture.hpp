@@ -2,6 +2,8 @@
 /// the driver that knows ioctls.
 #pragma once
 
+#include <poll.h>
+
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -88,6 +90,11 @@ class Capture {
   /// Stops, puts the controls back, closes. A device that went away is only forgotten.
   void close();
   [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
+  /// Waits for a frame, so many milliseconds at most. False when none came, or the driver says that none can.
+  [[nodiscard]] bool wait(int longest_ms) const {
+    pollfd frame{descriptor_, POLLIN, 0};
+    return is_open() && system_.poll(&frame, 1, longest_ms) > 0 && (frame.revents & POLLIN) != 0;
+  }
 
   enum class Taken : std::uint8_t { kBuffer, kNothing, kInputError, kLost };
   /// The next filled buffer. kInputError: the signal was disturbed (EIO), the stream may go on. kLost: the device is

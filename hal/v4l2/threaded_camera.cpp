@@ -6,8 +6,9 @@
 
 namespace firstlook::v4l2 {
 namespace {
-constexpr Duration kLook = milliseconds(3);         // of the loop, for what the thread left
+constexpr Duration kLook = milliseconds(8);         // of the loop, for what the thread left: a turn of the arm
 constexpr Duration kLongestNap = milliseconds(50);  // of the thread
+constexpr Duration kNap = milliseconds(2);          // where the driver did not let us wait for a frame
 }  // namespace
 
 Result<std::unique_ptr<ThreadedCamera>> ThreadedCamera::make(SystemCalls& system, const V4l2CameraOptions& options) {
@@ -39,12 +40,19 @@ void ThreadedCamera::work() {
     const auto frame = camera_->poll(now);
     const hal::StreamCounters stream = camera_->counters();
     const hal::DeviceReport report = camera_->report(now);
-    const Duration nap = std::clamp(camera_->next_due() - now, milliseconds(1), kLongestNap);
+    Duration nap = std::clamp(camera_->next_due() - now, kNap, kLongestNap);
     lock.lock();
     if (frame) newest_ = frame;
     stream_ = stream;
     report_ = report;
     color_ = camera_->delivers_color();
+    if (camera_->is_open()) {
+      lock.unlock();
+      const bool comes = camera_->wait(static_cast<int>(kLongestNap.ns / 1'000'000));
+      lock.lock();
+      if (comes) continue;
+      nap = kNap;
+    }
     changed_.wait_for(lock, std::chrono::nanoseconds(nap.ns), [&] { return stop_; });
   }
 }

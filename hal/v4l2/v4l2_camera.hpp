@@ -55,6 +55,9 @@ class V4l2Camera final : public hal::ColorCamera, public hal::ReportingDevice {
   [[nodiscard]] std::optional<hal::CornerObservation> read_corners(const hal::Frame&, int) override { return {}; }
   [[nodiscard]] hal::DeviceReport report(Instant now) const override;
 
+  /// Waits for a frame of an open camera; see Capture::wait.
+  [[nodiscard]] bool wait(int longest_ms) const { return capture_.wait(longest_ms); }
+  [[nodiscard]] bool is_open() const { return capture_.is_open(); }
   [[nodiscard]] const V4l2Counters& more_counters() const { return counters_; }
 
  private:

@@ -1,6 +1,7 @@
 /// The record of a run: every event and every decision, in order, so that the run can be repeated and compared.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "platform/core/fixed_vector.hpp"
 #include "platform/core/result.hpp"
 #include "platform/core/time.hpp"
 
@@ -17,6 +19,7 @@ namespace firstlook {
 
 inline constexpr std::uint32_t kJournalFormat = 1;
 inline constexpr std::size_t kJournalBytesMax = std::size_t{64} << 20;
+inline constexpr std::size_t kHeldBytesMax = 512;          ///< payload of an event that can be held
 inline constexpr std::uint16_t kNoteRecordingStopped = 1;  ///< the cap is reached; payload: u64 cap in bytes
 
 enum class RecordType : std::uint8_t { kEvent = 1, kDecision = 2, kNote = 3, kEnd = 4 };
@@ -54,6 +57,14 @@ class DecisionsHash {
 /// CRC-32 of IEEE 802.3, continued from `crc` (0 at the start).
 [[nodiscard]] std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
 
+/// An event that JournalWriter::hold keeps back.
+struct HeldEvent {
+  std::uint16_t kind = 0;
+  Instant time{};
+  std::size_t size = 0;
+  std::array<std::byte, kHeldBytesMax> payload{};
+};
+
 /// Writes a journal to a file or to memory. The loop thread alone; event(), decision() and note() never allocate. An
 /// error of the disk stops the recording, not the job: it stays in status().
 ///
@@ -73,6 +84,10 @@ class JournalWriter {
   virtual ~JournalWriter() = default;
 
   void event(std::uint16_t kind, Instant time, std::span<const std::byte> payload);
+  /// An event that is worth recording only if something is decided because of it, or after it: it is kept back, and
+  /// recorded before the next decision, note or other event. A `basis` takes the place of all that is kept back; of
+  /// events upon it only the newest is kept.
+  void hold(std::uint16_t kind, Instant time, std::span<const std::byte> payload, bool basis);
   void decision(std::uint16_t kind, Instant time, std::span<const std::byte> payload);
   void note(std::uint16_t kind, Instant time, std::span<const std::byte> payload);
   /// Writes what is buffered to the disk; also happens whenever the buffer is full.
@@ -101,6 +116,8 @@ class JournalWriter {
 
  private:
   void record(RecordType type, std::uint16_t kind, Instant time, std::span<const std::byte> payload);
+  void record_held();
+  void write_record(RecordType type, std::uint16_t kind, Instant time, std::span<const std::byte> payload);
   void append_record(RecordType type, std::uint16_t kind, Instant time, std::span<const std::byte> payload);
   void append(std::span<const std::byte> bytes);
 
@@ -111,6 +128,7 @@ class JournalWriter {
   std::uint64_t records_ = 0;
   std::uint32_t crc_ = 0;
   DecisionsHash decisions_;
+  FixedVector<HeldEvent, 2> held_;
   Status status_;
   bool recording_ = true;
   bool closed_ = false;

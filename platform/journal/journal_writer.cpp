@@ -120,7 +120,28 @@ void JournalWriter::note(std::uint16_t kind, Instant time, std::span<const std::
   record(RecordType::kNote, kind, time, payload);
 }
 
+void JournalWriter::hold(std::uint16_t kind, Instant time, std::span<const std::byte> payload, bool basis) {
+  ENSURE(1502, payload.size() <= kHeldBytesMax);
+  if (basis) held_.clear();
+  if (held_.full()) held_.pop_back();
+  held_.push_back({kind, time, payload.size(), {}});
+  std::ranges::copy(payload, held_.back().payload.begin());
+}
+
+void JournalWriter::record_held() {
+  for (const HeldEvent& held : held_) {
+    write_record(RecordType::kEvent, held.kind, held.time, std::span(held.payload).first(held.size));
+  }
+  held_.clear();
+}
+
 void JournalWriter::record(RecordType type, std::uint16_t kind, Instant time, std::span<const std::byte> payload) {
+  record_held();
+  write_record(type, kind, time, payload);
+}
+
+void JournalWriter::write_record(RecordType type, std::uint16_t kind, Instant time,
+                                 std::span<const std::byte> payload) {
   if (!recording_) return;
   if (bytes_ + kRecordFrameBytes + payload.size() + kClosingBytes > bytes_max_) {
     const std::uint64_t cap = bytes_max_;

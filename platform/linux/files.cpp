@@ -22,15 +22,6 @@ std::unexpected<Error> disk_failure(std::string_view path) {
   return failure(Fault::kDiskWrite, "{}: {}", path, std::strerror(errno));
 }
 
-/// So that the new name survives a power cut. Not every file system can do it; then there is nothing to be done.
-void sync_folder_of(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  (void)fsync(descriptor);
-  ::close(descriptor);
-}
-
 /// Reads all of a regular file into a string or a vector of bytes.
 template <typename Bytes>
 Result<Bytes> read_whole(const std::string& path, std::size_t bytes_max) {
@@ -61,6 +52,14 @@ Result<Bytes> read_whole(const std::string& path, std::size_t bytes_max) {
 }
 
 }  // namespace
+
+void sync_folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  (void)fsync(descriptor);
+  ::close(descriptor);
+}
 
 Status write_all(int descriptor, std::span<const std::byte> bytes, std::string_view path) {
   while (!bytes.empty()) {

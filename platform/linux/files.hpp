@@ -54,6 +54,10 @@ class AtomicFile {
 /// True when the folder is empty or not there. Error: kDiskWrite when it is something else or cannot be read.
 [[nodiscard]] Result<bool> folder_is_empty(const std::string& path);
 
+/// Makes sure that the name of a file or folder survives a power cut. Not every file system can do it; then there is
+/// nothing to be done.
+void sync_folder_of(const std::string& path);
+
 /// Writes all bytes to a descriptor, going on after short writes and interrupts. `path` is for the error's text. Does
 /// not allocate. Error: kDiskWrite.
 [[nodiscard]] Status write_all(int descriptor, std::span<const std::byte> bytes, std::string_view path);

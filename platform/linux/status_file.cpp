@@ -23,8 +23,10 @@ StatusFile::StatusFile(std::string_view path) {
 }
 
 StatusFile::~StatusFile() {
-  if (present()) (void)::unlink(path_.data());
+  if (present() && !left_) (void)::unlink(path_.data());
 }
+
+bool StatusFile::there() const { return present() && ::access(path_.data(), F_OK) == 0; }
 
 bool StatusFile::write(std::string_view text) const {
   if (!present()) return false;

@@ -1,4 +1,4 @@
-/// Waiting until an instant or until another thread wakes us: epoll over a timerfd and an eventfd.
+/// Waiting until an instant or until another thread wakes us: ppoll on an eventfd, one system call each time.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@ namespace firstlook {
 /// Nanoseconds of CLOCK_MONOTONIC.
 [[nodiscard]] std::int64_t monotonic_ns();
 
-/// One waiter, any number of wakers. The descriptors are opened at construction; ENSURE 1601 when there are none left.
+/// One waiter, any number of wakers. The descriptor is opened at construction; ENSURE 1601 when there is none left.
 class Wakeup {
  public:
   Wakeup();
@@ -22,8 +22,6 @@ class Wakeup {
   void wake() noexcept;
 
  private:
-  int epoll_ = -1;
-  int timer_ = -1;
   int event_ = -1;
 };
 

@@ -76,10 +76,19 @@ void EventLoop::dispatch_own(Instant now, std::uint16_t kind, T value) {
 void EventLoop::dispatch_all() {
   while (!queue_.empty()) {
     const Event& event = queue_.front();
-    if (journal_ != nullptr) journal_->event(event.kind, event.time, event.bytes());
+    if (journal_ != nullptr) record(event);
     ++events_;
     handler_.on_event(event);
     queue_.pop();
+  }
+}
+
+void EventLoop::record(const Event& event) {
+  const Worth worth = handler_.worth(event);
+  if (worth == Worth::kRecord) {
+    journal_->event(event.kind, event.time, event.bytes());
+  } else {
+    journal_->hold(event.kind, event.time, event.bytes(), worth == Worth::kHoldAsBasis);
   }
 }
 

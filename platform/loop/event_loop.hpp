@@ -25,10 +25,15 @@ class EventSource {
   [[nodiscard]] virtual Status collect(Instant now, EventQueue& queue) = 0;
 };
 
+/// What an event is worth to the journal: see JournalWriter::event and hold.
+enum class Worth : std::uint8_t { kRecord, kHold, kHoldAsBasis };
+
 /// The application. Runs to completion, never blocks.
 class EventHandler {
  public:
   virtual ~EventHandler() = default;
+  /// Asked before on_event.
+  [[nodiscard]] virtual Worth worth(const Event&) const { return Worth::kRecord; }
   virtual void on_event(const Event& event) = 0;
   /// All events of this turn are dispatched: send what is to be sent.
   virtual void end_of_turn(Instant now) = 0;
@@ -65,6 +70,7 @@ class EventLoop {
   template <typename T>
   void dispatch_own(Instant now, std::uint16_t kind, T value);
   void dispatch_all();
+  void record(const Event& event);
   [[nodiscard]] Instant next_due() const;
 
   Clock& clock_;

@@ -39,15 +39,92 @@ hung_loop() {
   stands 5 "the watchdog made a new process"
 }
 
+# names ROLE...: status.json has each of them among what is missing, within 3 s, and says what to do.
+names() {
+  local role
+  for role in "$@"; do
+    await 3 "grep -q '\"role\": \"$role\"[^}]*\"remedy\": \"[^\"]' /run/firstlook/status.json" >/dev/null ||
+      fail "status.json should name the $role and a remedy: $(status_of)"
+  done
+  say "status.json: $(status_of | sed 's/.*"missing": //' | cut -c 1-200)"
+}
+
+names_nothing() {
+  await "$1" "grep -q '\"missing\": \[\]' /run/firstlook/status.json" >/dev/null || fail "nothing should be missing: $(status_of)"
+}
+
 bus_down_in_ready() {
   say "the panel's bus goes down in Ready"
   guest "ip link set can0 down" || fail "can0 does not go down"
-  guest "sleep 2"
-  say "it says: $(status_of | cut -c 1-160)"
+  names panel
   guest "ip link set can0 up" || fail "can0 does not come up"
   again 60
+  names_nothing 10
   expect_light green
   stands 3 "the bus came back"
+}
+
+# Frozen, not ended: v4l2loopback takes no second feeder while its reader looks for it.
+cameras_stop() { guest "systemctl kill -s STOP rig-cameras" || fail "the cameras cannot be stopped"; }
+cameras_go_on() { guest "systemctl kill -s CONT rig-cameras" || fail "the cameras do not go on"; }
+
+cameras_off_in_ready() {
+  say "both cameras stop in Ready"
+  cameras_stop
+  await 10 "grep -q 'colour camera.*depth camera' /run/firstlook/status.json" >/dev/null ||
+    fail "status.json should name both cameras within seconds: $(status_of)"
+  names "colour camera" "depth camera"
+  expect_light red
+  play
+  press start
+  stands 3 "Play and start were pressed without cameras"
+  cameras_go_on
+  names_nothing 30
+  expect_light green
+  stands 3 "the cameras are back"
+  guest "/usr/lib/rig/play stop" >/dev/null
+}
+
+# From the button to the report, with few views; then a fresh process is in Ready.
+job_to_its_end() {
+  local before from run peak
+  before=$(restarts)
+  start_job
+  from=$(guest "cut -d ' ' -f 1 /proc/uptime")
+  guest "(group=/sys/fs/cgroup\$(systemctl show -p ControlGroup --value firstlook); while cat \$group/memory.peak; do sleep 1; done) >/run/rig/peaks 2>/dev/null </dev/null & disown"
+  guest_patience_s=3000 await 1200 "[ \"\$(systemctl show -p NRestarts --value firstlook)\" -gt $before ]" >/dev/null ||
+    fail "the job does not come to its end: $(status_of)"
+  run=$(guest "ls -dt /var/lib/firstlook/runs/*/ | grep -v /waiting/ | head -n 1")
+  guest "grep -q '\"outcome\": \"done\"' $run/result.json" ||
+    fail "the job ended with: $(guest "grep -m 3 -E '\"(outcome|reason)\"' $run/result.json; journalctl -b -u firstlook -o cat --no-pager -n 12")"
+  peak=$(guest "sort -n /run/rig/peaks | tail -n 1")
+  say "the job ended with its report after $(guest "cut -d ' ' -f 1 /proc/uptime" | awk -v from="$from" '{ printf "%.0f", $1 - from }') s: $(guest "journalctl -b -u firstlook -o cat --no-pager | grep '^done:' | tail -n 1" | cut -c 1-160)"
+  say "memory of the service at most $((peak / 1048576)) MiB of the limit of 384"
+  [ "$peak" -lt $((384 << 20)) ] || fail "more memory than the limit"
+  guest "firstlook replay $run/journal.flj" || fail "the job's journal does not replay"
+  guest "[ ! -e $run/checkpoint.yaml ]" || fail "a job that has ended left a checkpoint"
+  again 60
+  expect_light green
+  stands 3 "the job has ended"
+}
+
+# The same rules as tests/conformance, for the drivers above the guest's kernel; the panel's module and the driver on two
+# controllers of their own (kvaser_pci, SJA1000) and one cable.
+real_drivers() {
+  local out
+  say "the conformance suite of the real drivers"
+  guest "systemctl stop firstlook; modprobe kvaser_pci && modprobe vivid && sleep 1; for i in can1 can2; do ip link set \$i type can bitrate 125000 restart-ms 100 && ip link set \$i up || exit 1; done" ||
+    fail "the emulated CAN controllers do not come up: $(guest 'ip -br link; dmesg | tail -n 5')"
+  guest "/usr/lib/rig/rig_panel can2 /usr/lib/rig/firstlook_panel.eds 10 /run/rig/buttons2 /run/rig/panel2 >/dev/null 2>&1 </dev/null & disown"
+  out=$(guest "FIRSTLOOK_RIG_CAMERAS='/dev/video10 320 240 /dev/video20 640 480' FIRSTLOOK_RIG_PANEL='can1 /run/rig/panel2 /run/rig/buttons2' FIRSTLOOK_RIG_RECORDING=/run/rig/cell.oni timeout 200 /usr/lib/rig/rig_conformance") || fail "the real drivers: $out"
+  say "the real drivers: $(echo "$out" | tail -n 1)"
+  out=$(guest "sed 's|device: openni|device: /run/rig/cell.oni|; s|can_interface: can0|can_interface: can1|' /etc/firstlook/firstlook.yaml >/run/rig/other.yaml; firstlook check --config /run/rig/other.yaml 2>/dev/null" || true)
+  echo "$out" >"$logs/check-recording.txt"
+  echo "$out" | grep -q 'recording' || fail "check should take depth from the recording: $out"
+  echo "$out" | grep -q 'can1 node 10.*ready\|ready.*can1 node 10' || fail "check should find the panel on can1: $out"
+  say "check: depth from a recording, the panel on can1"
+  guest "kill \$(pgrep -f 'rig_panel can2'); ip link set can1 down; ip link set can2 down; modprobe -r vivid; systemctl start firstlook --no-block"
+  again 90
 }
 
 bus_down_in_motion() {
@@ -80,10 +157,10 @@ stop_button() {
 
 cameras_gone() {
   say "both cameras stop while the arm moves"
-  guest "systemctl stop rig-cameras"
+  cameras_stop
   await 60 "! $(state_is LocateBoard)" >/dev/null || fail "the job goes on without cameras: $(status_of)"
   stands 3 "there are no pictures"
-  guest "systemctl start rig-cameras"
+  cameras_go_on
   again 120
 }
 
@@ -132,8 +209,9 @@ full_disk() {
 robot_late() {
   say "the robot is off for a minute, firstlook starts without it"
   guest "systemctl stop rig-robot; systemctl restart --no-block firstlook"
-  guest "sleep 60"
-  say "it says: $(guest "systemctl show -p ActiveState --value firstlook"), $(guest "journalctl -b -u firstlook -o cat --no-pager -n 5 | grep -E 'E[0-9]{4}' | tail -n 1")"
+  await 60 "grep -q '\"role\": \"arm\"' /run/firstlook/status.json" >/dev/null || fail "status.json should name the arm: $(status_of)"
+  names arm
+  guest "sleep 30"
   guest "systemctl start rig-robot"
   again 90
 }
@@ -144,8 +222,11 @@ break_things() {
   boot 90
   expect_light green
   idle
+  job_to_its_end
   robot_late
   camera_faults
+  real_drivers
+  cameras_off_in_ready
   bus_down_in_ready
   bus_off
   memory_pressure
@@ -159,6 +240,17 @@ break_things() {
   start_job
   cameras_gone
   say "memory of the service: $(memory_of_service)"
+  power_down
+}
+
+# One of the parts above on a computer of its own.
+part() {
+  declare -F "$1" >/dev/null || fail "there is no part $1; tests/rig/breaking.bash has them"
+  image "$2" "part-$2"
+  say "power on, kernel $2"
+  boot 90
+  expect_light green
+  "$1"
   power_down
 }
 

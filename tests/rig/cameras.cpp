@@ -48,7 +48,9 @@ int open_video(const char* path, int width, int height) {
   format.fmt.pix.bytesperline = static_cast<std::uint32_t>(2 * width);
   format.fmt.pix.sizeimage = static_cast<std::uint32_t>(2 * width * height);
   if (ioctl(device, VIDIOC_S_FMT, &format) == 0) return device;
+  const int refused = errno;
   close(device);
+  errno = refused;
   return -1;
 }
 
@@ -90,16 +92,21 @@ class WatchedFeed final : public sim::TrueJointFeed {
   std::int64_t moved_ns_ = monotonic_ns();
 };
 
-/// Whether a picture is to be rendered: while the arm moves and once more a while after it, when it has swung out.
-/// Between that the last picture is shown again, which costs an emulated computer little.
+/// What to show. Rendering is what an emulated computer is slowest at: it is done once for each place where the arm
+/// stands, when it has swung out. While it moves the last picture is shown again, which is wrong then (the rig's
+/// configuration uses no pictures of a moving camera), and none in between: one of before would be taken for one of
+/// now.
+enum class Shown : std::uint8_t { kLast, kNone, kNew };
 class Freshness {
  public:
-  [[nodiscard]] bool wanted(std::int64_t moved_ns) {
-    constexpr std::int64_t kSwings_ns = 500'000'000;
-    const std::int64_t now_ns = monotonic_ns();
-    if (rendered_ns_ > moved_ns + kSwings_ns) return false;
-    rendered_ns_ = now_ns;
-    return true;
+  [[nodiscard]] Shown next(std::int64_t moved_ns) {
+    constexpr std::int64_t kStands_ns = 60'000'000, kSwings_ns = 200'000'000;
+    if (rendered_ns_ > moved_ns) return Shown::kLast;
+    const std::int64_t stood_ns = monotonic_ns() - moved_ns;
+    if (stood_ns < kStands_ns && rendered_ns_ != 0) return Shown::kLast;
+    if (stood_ns < kSwings_ns) return Shown::kNone;
+    rendered_ns_ = monotonic_ns();
+    return Shown::kNew;
   }
 
  private:
@@ -124,24 +131,9 @@ class Feeder {
 
   Status turn(Instant now, std::int64_t clock_start_ns) {
     if (const auto frame = cell_.color().poll(now)) {
-      const CameraIntrinsics& k = cell_.color().intrinsics();
-      if (color_.wanted(arm_.moved_ns())) {
-        if (const Status read = cell_.color().read(*frame, {gray_.data(), k.width, k.height}); !read) return read;
-        for (std::size_t i = 0; i < gray_.size(); ++i) yuyv_[2 * i] = gray_[i];
-      }
-      if (write(video_, yuyv_.data(), yuyv_.size()) < 0) return failure(Fault::kDiskWrite, "{}", std::strerror(errno));
+      if (const Status shown = show_color(*frame); !shown) return shown;
     }
-    if (const auto frame = cell_.depth().poll(now)) {
-      const CameraIntrinsics& k = cell_.depth().intrinsics();
-      if (depth_fresh_.wanted(arm_.moved_ns())) {
-        if (const Status read = cell_.depth().read(*frame, {depth_.data(), k.width, k.height}); !read) return read;
-      }
-      window_.turn.fetch_add(1, std::memory_order_acq_rel);
-      std::memcpy(window_.depth_mm, depth_.data(), sizeof window_.depth_mm);
-      ++window_.frame;
-      window_.stamp_us = static_cast<std::uint64_t>((frame->stamp.ns + clock_start_ns) / 1000);
-      window_.turn.fetch_add(1, std::memory_order_release);
-    }
+    if (const auto frame = cell_.depth().poll(now)) return show_depth(*frame, clock_start_ns);
     return {};
   }
 
@@ -150,9 +142,39 @@ class Feeder {
     return static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
   }
 
+  Status show_color(const hal::Frame& frame) {
+    const CameraIntrinsics& k = cell_.color().intrinsics();
+    const Shown shown = color_fresh_.next(arm_.moved_ns());
+    if (shown == Shown::kNone) return {};
+    if (shown == Shown::kNew) {
+      if (const Status read = cell_.color().read(frame, {gray_.data(), k.width, k.height}); !read) return read;
+      for (std::size_t i = 0; i < gray_.size(); ++i) yuyv_[2 * i] = gray_[i];
+    }
+    if (write(video_, yuyv_.data(), yuyv_.size()) < 0) return failure(Fault::kDiskWrite, "{}", std::strerror(errno));
+    return {};
+  }
+
+  Status show_depth(const hal::Frame& frame, std::int64_t clock_start_ns) {
+    const CameraIntrinsics& k = cell_.depth().intrinsics();
+    const Shown shown = depth_fresh_.next(arm_.moved_ns());
+    if (shown == Shown::kNone) return {};
+    if (shown == Shown::kNew) {
+      if (const Status read = cell_.depth().read(frame, {depth_.data(), k.width, k.height}); !read) return read;
+    }
+    window_.turn.fetch_add(1, std::memory_order_acq_rel);
+    std::memcpy(window_.depth_mm, depth_.data(), sizeof window_.depth_mm);
+    ++window_.frame;
+    // No sensor gives the same picture twice, and firstlook stops at one that does.
+    std::uint16_t& pixel = window_.depth_mm[window_.frame % depth_.size()];
+    if (pixel != 0) ++pixel;
+    window_.stamp_us = static_cast<std::uint64_t>((frame.stamp.ns + clock_start_ns) / 1000);
+    window_.turn.fetch_add(1, std::memory_order_release);
+    return {};
+  }
+
   sim::SimulatedCell& cell_;
   const WatchedFeed& arm_;
-  Freshness color_, depth_fresh_;
+  Freshness color_fresh_, depth_fresh_;
   int video_;
   DepthWindow& window_;
   std::vector<std::uint8_t> gray_;
@@ -172,7 +194,10 @@ int feed(sim::SimulationOptions options, const char* device) {
   if (!cell) return complain("the cell", cell.error());
   const CameraIntrinsics& color = (*cell)->color().intrinsics();
   const int video = open_video(device, color.width, color.height);
-  if (video < 0) return complain(device, "cannot be fed with YUYV pictures; is it a v4l2loopback device?");
+  if (video < 0) {
+    const std::string why = std::strerror(errno);
+    return complain(device, ("cannot be fed with YUYV pictures (" + why + "); is it a v4l2loopback device?").c_str());
+  }
   DepthWindow* const window = make_window();
   if (window == nullptr) return complain(kDepthWindowPath, std::strerror(errno));
   Feeder feeder(**cell, arm, video, *window);

@@ -31,6 +31,7 @@ power_on() {
     -monitor none -kernel "$vmlinuz" -initrd "$initrd" \
     -append "root=/dev/vda console=ttyS0 quiet panic=-1 mitigations=off tsc=reliable ${append:-}" \
     -drive "file=$run/disk.qcow2,if=virtio,format=qcow2,cache=writeback" -device virtio-rng-pci \
+    -object can-bus,id=cable -device kvaser_pci,canbus=cable -device kvaser_pci,canbus=cable \
     -chardev "file,id=console,path=$console,append=on" -serial chardev:console \
     -chardev "pipe,id=line,path=$run/line" -serial chardev:line </dev/null >"$logs/emulator.log" 2>&1 &
   emulator=$!

@@ -15,17 +15,34 @@ await_lines() {
 # one, and whose job has not ended.
 calibration_expected() {
   console_text | tr -d '\r' | awk -v expected="$1" '
+    /^EMPTIED/ { expected = "no" }
     /calibration accepted/ { expected = "yes" }
     /^ENDED/ { expected = "no" }
     END { print expected }'
 }
 
+# Every third cut falls into the writing of the checkpoint: on an empty disk, up to 0.4 s after the job has said that it
+# validates the calibration. The others fall anywhere: so many lines after Ready, and up to a second more.
+await_moment() {
+  if [ $(($2 % 3)) = 0 ]; then
+    console_says 900 'validating the calibration' || fail "cut $2: the job does not come to its calibration; see $console"
+    sleep "0.$(printf '%03d' "$(draw "$1" "$2+" 400)")"
+    moment="writing the checkpoint ($(console_text | grep -ac "calibration accepted" || true) accepted)"
+    return
+  fi
+  local lines=$((1 + $(draw "$1" "$2" 45)))
+  await_lines "$lines"
+  sleep "0.$(printf '%03d' "$(draw "$1" "$2+" 1000)")"
+  moment="$lines lines after Ready"
+}
+
 cut_power() {
-  local cuts=$1 seed=$2 i lines expected=no found lost=0 halves=0 offered=0 accepted=0
+  local cuts=$1 seed=$2 i expected=no found lost=0 halves=0 offered=0 accepted=0 moment
   image std power
-  append="init=/usr/lib/rig/tiny-init"
   say "$cuts power cuts, moments drawn from seed $seed"
   for ((i = 1; i <= cuts; ++i)); do
+    append="init=/usr/lib/rig/tiny-init"
+    if [ $((i % 3)) = 0 ]; then append+=" rig_empties"; fi
     power_on
     console_says 900 '^FOUND code' || fail "cut $i: the computer did not come back; see $console"
     found=$(console_text | tr -d '\r' | sed -n '/^FOUND begin/,/^FOUND code/p')
@@ -33,14 +50,11 @@ cut_power() {
     if [ "$expected" = yes ] && ! echo "$found" | grep -q 'whole .*\(checkpoint\|hand_eye\).yaml'; then lost=$((lost + 1)); fi
     console_says 900 'Ready' || fail "cut $i: firstlook did not come back to Ready; see $console"
     if console_text | grep -q 'was cut off after its calibration'; then offered=$((offered + 1)); fi
-    # A moment of the job, not of the clock: so many lines after Ready, and up to a second more.
-    lines=$((1 + $(draw "$seed" "$i" 45)))
-    await_lines "$lines"
-    sleep "0.$(printf '%03d' "$(draw "$seed" "$i+" 1000)")"
+    await_moment "$seed" "$i"
     power_cut
     expected=$(calibration_expected "$expected")
     if [ "$expected" = yes ]; then accepted=$((accepted + 1)); fi
-    say "cut $i/$cuts, $lines lines after Ready: found $(echo "$found" | grep -c whole || true) whole, $(echo "$found" | grep -c HALF || true) half; before the cut: $(console_text | tr -d '\r' | grep -E '^\[|^ENDED' | tail -n 1 | cut -c 1-60)"
+    say "cut $i/$cuts, $moment: found $(echo "$found" | grep -c whole || true) whole, $(echo "$found" | grep -c HALF || true) half; before the cut: $(console_text | tr -d '\r' | grep -E '^\[|^ENDED' | tail -n 1 | cut -c 1-60)"
     if [ $((lost + halves)) != 0 ]; then fail "cut $i: a calibration is lost ($lost) or half-written ($halves): $found"; fi
   done
   say "$cuts cuts: $accepted after a calibration was accepted, $offered times a run was offered to be taken up; 0 lost, 0 half-written"

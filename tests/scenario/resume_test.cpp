@@ -1,4 +1,6 @@
 /// A power cut after the calibration: the next start says what it has and goes on from there, never by itself.
+#include <stdlib.h>  // NOLINT: setenv is POSIX
+
 #include <csignal>
 
 #include "tests/support/job_run.hpp"
@@ -38,6 +40,71 @@ TEST_CASE("a service that was started without a device leaves no folder; a job t
   CHECK(stopped.exit_code == 6);
   REQUIRE(folder.names("runs").size() == 1);
   CHECK(std::filesystem::exists(folder / ("runs/" + folder.names("runs").front()) / "result.json"));
+}
+
+TEST_CASE("a service that waits records nothing and has no folder before its job", "[scenario]") {
+  JobFolder folder;
+  const std::vector<std::string> service = {"run", "--cell", "empty", "--seed", "1", "--sensor", "fast", "--resume"};
+  const auto with = [&](const char* faults) {
+    std::vector<std::string> words = service;
+    words.insert(words.end(), {"--faults", faults});
+    return words;
+  };
+  const auto job = [&](const char* faults) {
+    const ProgramResult run = folder.run(with(faults));
+    INFO(run.err);
+    CHECK(run.exit_code == 6);
+    const std::vector<std::string> runs = folder.names("runs");
+    REQUIRE(runs.size() == 1);
+    CHECK(runs.front() != "waiting");
+    const std::string journal = "runs/" + runs.front() + "/journal.flj";
+    const auto bytes = std::filesystem::file_size(folder / journal);
+    const ProgramResult replayed = folder.run({"replay", journal});
+    INFO(replayed.err);
+    CHECK(replayed.exit_code == 0);
+    check_safe(folder.read_json("runs/" + runs.front() + "/result.json"));
+    std::filesystem::remove_all(folder / "runs");
+    return bytes;
+  };
+  const auto at_once = job("operator.stop_at=20.5");
+  const auto after_ten_minutes = job("operator.play_at=590.5,operator.stop_at=610.5");
+  CHECK(after_ten_minutes < at_once + 4096);
+
+  // The power is cut in Ready, again and again.
+  folder.options.signal_at = "ready: press Play";
+  folder.options.signal = SIGKILL;
+  for (int i = 0; i < 2; ++i) {
+    std::vector<std::string> words = with("operator.play_at=never");
+    words.emplace_back("--real-time");
+    REQUIRE(folder.run(words).exit_code == 128 + SIGKILL);
+    CHECK(folder.names("runs") == std::vector<std::string>{"waiting"});
+  }
+  folder.options.signal_at.clear();
+  CHECK(job("operator.stop_at=5") > 0);
+}
+
+TEST_CASE("a service that cannot open its devices names all of them until it is started again", "[scenario]") {
+  const JobFolder folder;
+  folder.write("cart.yaml", R"(robot: {host: 127.0.0.1, port_offset: 21000}
+camera: {device: /dev/no-camera, width: 640, height: 480}
+depth: {device: /nowhere/recording.oni}
+panel: {can_interface: nocan0}
+calibration: {intrinsics: estimate}
+)");
+  std::filesystem::create_directories(folder / "status");
+  setenv("RUNTIME_DIRECTORY", (folder / "status").c_str(), 1);
+  const ProgramResult run = folder.run({"run", "--config", "cart.yaml", "--real-time", "--resume"});
+  unsetenv("RUNTIME_DIRECTORY");
+  CHECK(run.exit_code == 4);
+  const Json status = folder.read_json("status/status.json");
+  CHECK(status["fault"] == 5001);
+  std::vector<std::string> roles;
+  for (const Json& device : status["missing"]) {
+    roles.push_back(device["role"]);
+    CHECK_FALSE(device["remedy"].get<std::string>().empty());
+  }
+  CHECK(roles == std::vector<std::string>{"colour camera", "depth camera", "panel", "arm", "pendant"});
+  CHECK_FALSE(std::filesystem::exists(folder / "runs"));
 }
 
 TEST_CASE("a run that was killed while it mapped is taken up with its calibration", "[scenario]") {

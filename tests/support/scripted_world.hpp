@@ -89,6 +89,7 @@ class ScriptedWorld : public DecisionSink {
   Machine machine;
   std::vector<StateId> visited;
   std::vector<std::string> shown;
+  std::vector<hal::Light> lights;
   std::vector<Fault> stops;
   std::vector<hal::Segment> segments;
   std::size_t segments_after_stop = 0;
@@ -240,7 +241,7 @@ class ScriptedWorld : public DecisionSink {
   void set_timer(Instant, MachineTimer timer, Instant due) override { timers_[timer] = due; }
   void cancel_timer(Instant, MachineTimer timer) override { timers_.erase(timer); }
   void show(Instant, std::string_view line) override { shown.emplace_back(line); }
-  void light(Instant, hal::Light) override {}
+  void light(Instant, hal::Light light) override { lights.push_back(light); }
   void forget_known_free(Instant) override { ++forgotten; }
   void stop_recorded(Instant, Fault cause) override { stops.push_back(cause); }
   void finished(Instant, const Ending& how) override {

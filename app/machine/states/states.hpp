@@ -8,6 +8,7 @@ namespace firstlook::states {
 void enter_boot(Machine& m);
 Handled on_boot(Machine& m, const MachineEvent& event);
 void enter_ready(Machine& m);
+void exit_ready(Machine& m);
 Handled on_ready(Machine& m, const MachineEvent& event);
 void enter_running(Machine& m);
 Handled on_running(Machine& m, const MachineEvent& event);

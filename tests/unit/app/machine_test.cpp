@@ -42,6 +42,44 @@ TEST_CASE("the panel's button starts only within a minute of Play", "[machine]")
   CHECK(world.run_until(StateId::kLocateBoard, 1));
 }
 
+TEST_CASE("a device that is missing in Ready is named, and no job begins without it", "[machine]") {
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.start_source = GENERATE(StartSource::kPendant, StartSource::kPanel);
+  ScriptedWorld world(settings);
+  const auto start = [&] {
+    world.press(OperatorAction::kPlay);
+    world.press(OperatorAction::kPlay, OperatorDevice::kPanel);
+    return world.run_until(StateId::kLocateBoard, 1);
+  };
+  REQUIRE(world.run_until(StateId::kReady));
+  CHECK(world.lights.back() == hal::Light::kGreen);
+  world.machine.on_event(world.now, DeviceChanged{CartDevice::kDepthCamera, false});
+  CHECK(world.lights.back() == hal::Light::kRed);
+  CHECK_THAT(world.shown.back(), Catch::Contains("the depth camera is missing or wrong: see"));
+  world.machine.on_event(world.now, DeviceChanged{CartDevice::kPanel, false});
+  CHECK_THAT(world.shown.back(), Catch::Contains("wrong, and more"));
+  CHECK_FALSE(start());
+  CHECK(world.has_shown("cannot start, the depth camera is missing"));
+  world.machine.on_event(world.now, DeviceChanged{CartDevice::kDepthCamera, true});
+  CHECK_FALSE(start());
+  CHECK(world.lights.back() == hal::Light::kRed);
+  world.machine.on_event(world.now, DeviceChanged{CartDevice::kPanel, true});
+  CHECK(world.lights.back() == hal::Light::kGreen);
+  CHECK_FALSE(world.run_until(StateId::kLocateBoard, 5));  // by itself
+  CHECK(start());
+}
+
+TEST_CASE("of what came in Ready the job remembers only where the arm is: a record leaves the rest out", "[machine]") {
+  ScriptedWorld world;
+  REQUIRE(world.run_until(StateId::kReady));
+  world.wait(2);
+  REQUIRE(world.machine.stood_at(0.5));
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kLocateBoard, 1));
+  CHECK_FALSE(world.machine.stood_at(0.1));
+  CHECK(world.machine.arm().position_rad == world.position_rad());
+}
+
 TEST_CASE("a missing device is named at boot", "[machine]") {
   ScriptedWorld world;
   world.devices = false;

@@ -4,8 +4,11 @@
 #include <stdlib.h>  // NOLINT: setenv is POSIX
 #include <unistd.h>
 
+#include <array>
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "platform/linux/files.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -59,6 +62,42 @@ TEST_CASE("a service has started when it is ready, once, and its state is in the
   status.state("Ready", true);
   for (std::string message = service.socket.receive(); !message.empty(); message = service.socket.receive())
     CHECK(message != "READY=1");
+}
+
+TEST_CASE("the file names every device that is missing, with its remedy, and stays where it is left") {
+  const Service service;
+  const std::string file = (service.folder.path() / "status.json").string();
+  hal::DeviceReport panel;
+  panel.state = hal::DeviceState::kLost;
+  panel.device.set("can0 node 10");
+  panel.detail.set("the interface \"can0\" is down");
+  panel.remedy.set("ip link set can0 up");
+  hal::DeviceReport camera;
+  camera.state = hal::DeviceState::kMissing;
+  {
+    ServiceStatus status("robot");
+    status.state("Ready", true);
+    CHECK(service.status()["missing"].empty());
+    const std::array<MissingDevice, 2> both{{{"panel", &panel}, {"colour camera", &camera}}};
+    status.missing(both);
+    const auto missing = service.status()["missing"];
+    REQUIRE(missing.size() == 2);
+    CHECK(missing[0]["role"] == "panel");
+    CHECK(missing[0]["device"] == "can0 node 10");
+    CHECK(missing[0]["state"] == "lost");
+    CHECK(missing[0]["what"] == "the interface can0 is down");
+    CHECK(missing[0]["remedy"] == "ip link set can0 up");
+    CHECK(missing[1]["state"] == "missing");
+    status.missing({});
+    CHECK(service.status()["missing"].empty());
+  }
+  CHECK_FALSE(std::filesystem::exists(file));
+  for (auto* text : {&panel.detail, &panel.remedy}) text->set("{}", std::string(1000, 'x'));
+  ServiceStatus status("robot");
+  const std::vector<MissingDevice> many(30, {"panel", &panel});
+  status.missing(many);  // what does not fit is left out, the file stays whole
+  CHECK(service.status()["missing"].size() >= 5);
+  status.leave_file();
 }
 
 TEST_CASE("the watchdog is fed four times in the manager's interval, and not at all for another process") {

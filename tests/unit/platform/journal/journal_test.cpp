@@ -73,6 +73,32 @@ TEST_CASE("CRC-32 and FNV-1a give their published values") {
   CHECK(hash_text(0xabc) == "0000000000000abc");
 }
 
+TEST_CASE("an event that is held is recorded before what is decided, and not at all when nothing is") {
+  auto writer = JournalWriter::create_memory(kNoHeader, 4096);
+  REQUIRE(writer);
+  JournalWriter& w = **writer;
+  for (int i = 0; i < 100; ++i) {
+    w.hold(16, Instant{i}, bytes_of("report " + std::to_string(i)), true);
+    w.hold(17, Instant{i}, bytes_of("color"), false);
+    w.hold(18, Instant{i}, bytes_of("depth"), false);
+  }
+  CHECK(w.records() == 0);
+  w.decision(1, Instant{99}, bytes_of("stop"));
+  w.decision(2, Instant{99}, bytes_of("light"));
+  w.hold(18, Instant{100}, bytes_of("depth"), false);
+  w.event(19, Instant{101}, bytes_of("key"));
+  w.hold(16, Instant{102}, bytes_of("report"), true);
+  REQUIRE(w.close(Instant{103}));
+  auto reader = JournalReader::from_bytes({w.memory().begin(), w.memory().end()});
+  REQUIRE(reader);
+  std::vector<std::pair<std::int64_t, std::string>> found;
+  for (auto record = reader->next(); record && *record; record = reader->next())
+    found.emplace_back((*record)->time.ns, text_of((*record)->payload));
+  CHECK(found == std::vector<std::pair<std::int64_t, std::string>>{
+                     {99, "report 99"}, {99, "depth"}, {99, "stop"}, {99, "light"}, {100, "depth"}, {101, "key"}});
+  CHECK(reader->decisions_hash() == w.decisions_hash());
+}
+
 TEST_CASE("records come back in order with their bytes, and the end gives the hash of the decisions") {
   auto reader = JournalReader::from_bytes(small_journal());
   REQUIRE(reader);
