@@ -400,7 +400,7 @@ Answer decide_portable(const Question& q, const Floats (&angles_rad)[kJointsMax]
 
 void configurations_are_free(const ArmModel& arm, const Body& body, const FreeSpace& space, const Clearance& clearance,
                              std::span<const JointVector> q_rad, double margin_m, std::span<std::uint8_t> free) {
-  ENSURE(4131, q_rad.size() == free.size());
+  ENSURE(4151, q_rad.size() == free.size());
   const Question question = question_of(arm, body, space, clearance, margin_m);
   const bool avx2 = has_avx2();
   for (std::size_t first = 0; first < q_rad.size(); first += kLanes) {

@@ -447,7 +447,9 @@ bool Machine::advance_look(const MachineEvent& event) {
   }
   if (const auto* color = std::get_if<ColorPosed>(&event); color && look_depth_ && settings_.color_at_looks)
     color_beside_ = color->frame;
-  if (posed == nullptr || !look_open_ || posed->frame.stamp < look_from_) return false;
+  if (posed == nullptr || !look_open_) return false;
+  look_unposed_ = false;
+  if (posed->frame.stamp < look_from_) return false;
   look_.push_back(*posed);
   if (look_.size() < look_count_) return false;
   looking_ = false;

@@ -237,7 +237,7 @@ class Machine {
   Instant last_way_frame_{};
 
   bool looking_ = false, look_open_ = false, look_depth_ = false;
-  bool look_unposed_ = false;  ///< frames came, but none whose pose is known
+  bool look_unposed_ = false;  ///< frames came since the last one whose pose is known
   std::size_t look_count_ = 0;
   std::uint32_t looks_ = 0;
   Instant look_from_{};

@@ -24,7 +24,7 @@ void tell_bus(const RemoteIo& io, hal::DeviceReport& report) {
       break;
     case BusTrouble::kDown:
       report.detail.set("the interface {} is down", name);
-      report.remedy.set("ip link set {} up type can bitrate 125000 restart-ms 100, with the panel's bit rate.", name);
+      report.remedy.set("ip link set {} up type can bitrate 250000 restart-ms 100, with the panel's bit rate.", name);
       break;
     case BusTrouble::kRefused:
       report.detail.set("{}: {}", name, std::strerror(io.bus_error()));

@@ -1,4 +1,8 @@
 /// The whole calibration in a cell with several boards, no two of which must be in one picture.
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "algorithms/calibration/calibration_view.hpp"
 #include "hal/sim/cell_file.hpp"
 #include "tests/support/job_run.hpp"
@@ -107,8 +111,17 @@ TEST_CASE("several boards: found, solved together with their mutual poses, repla
 TEST_CASE("one of several boards that moved between calibration and the end rejects the map", "[scenario]") {
   const JobFolder folder;
   folder.write("cell.yaml", kCell);
-  const auto moved = folder.run({"run", "--cell", "cell.yaml", "--seed", "1", "--sensor", "fast", "--out", "out",
-                                 "--faults", "board.move_at=400,board.number=3"});
+  const std::vector<std::string> job = {"run", "--cell", "cell.yaml", "--seed", "1", "--sensor", "fast", "--out"};
+  const auto and_more = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), job.begin(), job.end());
+    return folder.run(more);
+  };
+  REQUIRE(and_more({"calibrated", "--only", "calibrate"}).exit_code == 0);
+  const Json phases = folder.read_json("calibrated/result.json")["phases"];
+  const auto park = std::ranges::find(phases, "Park", [](const Json& phase) { return phase["name"]; });
+  REQUIRE(park != phases.end());
+  const double mapping_s = (*park)["start_s"].get<double>() + 20;  // some time after mapping has begun
+  const auto moved = and_more({"out", "--faults", fmt::format("board.move_at={},board.number=3", mapping_s)});
   INFO(moved.err);
   CHECK(moved.exit_code == 6);
   CHECK_THAT(std::string(folder.read_json("out/result.json")["reason"]), Catch::Contains("board moved"));
