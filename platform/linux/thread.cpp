@@ -1,5 +1,7 @@
 #include "platform/linux/thread.hpp"
 
+#include <sched.h>
+
 #include <csignal>
 #include <utility>
 
@@ -30,6 +32,11 @@ void* Thread::run(void* self) {
   pthread_setname_np(pthread_self(), thread.name_.c_str());
   thread.body_();
   return nullptr;
+}
+
+void compute_in_the_background() noexcept {
+  const sched_param none{};
+  (void)pthread_setschedparam(pthread_self(), SCHED_OTHER, &none);
 }
 
 }  // namespace firstlook

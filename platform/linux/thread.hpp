@@ -25,4 +25,8 @@ class Thread {
   pthread_t thread_{};
 };
 
+/// The calling thread computes for long: whatever priority its process has for the loop's sake, it takes turns with
+/// everything else.
+void compute_in_the_background() noexcept;
+
 }  // namespace firstlook

@@ -79,6 +79,7 @@ void JobRunner::execute(Slot& slot) {
 }
 
 void JobRunner::serve(bool map_strand) {
+  compute_in_the_background();
   std::unique_lock lock(mutex_);
   while (true) {
     Slot* slot = nullptr;

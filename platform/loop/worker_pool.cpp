@@ -55,6 +55,7 @@ void WorkerPool::parallel_for(int count, Body body) {
 }
 
 void WorkerPool::serve(int worker) {
+  compute_in_the_background();
   std::uint64_t done = 0;
   std::unique_lock lock(mutex_);
   while (true) {

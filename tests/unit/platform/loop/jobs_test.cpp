@@ -1,5 +1,7 @@
 #include "platform/loop/jobs.hpp"
 
+#include <sched.h>
+
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <memory>
@@ -170,6 +172,36 @@ TEST_CASE("threaded: the strand keeps the order of submission, other jobs pass i
     CHECK(strand[i].number == i + 1);
     CHECK(echo.order[i + 1] == i + 1);
   }
+}
+
+TEST_CASE("threaded: jobs take turns with everything else, whatever priority the loop has") {
+  class Policy final : public JobExecutor {
+   public:
+    std::size_t execute(const JobRequest&, std::span<std::byte>) noexcept override {
+      policy = sched_getscheduler(0);  // of the calling thread
+      return 0;
+    }
+    std::atomic<int> policy{-1};
+  };
+  const sched_param urgent{.sched_priority = 1};
+  if (pthread_setschedparam(pthread_self(), SCHED_RR, &urgent) != 0) {
+    WARN("skipped: this process may not have a real-time priority");
+    return;
+  }
+  Policy seen;
+  RealClock clock;
+  {
+    JobRunner jobs(seen, clock, JobMode::kThreaded);
+    EventQueue queue;
+    REQUIRE(jobs.submit(*request(1, 1, true), clock.now()));
+    while (queue.empty()) {
+      clock.sleep_until(jobs.next_due());
+      jobs.collect(clock.now(), queue);
+    }
+  }
+  const sched_param none{};
+  CHECK(pthread_setschedparam(pthread_self(), SCHED_OTHER, &none) == 0);
+  CHECK(seen.policy == SCHED_OTHER);
 }
 
 TEST_CASE("threaded: the runner ends with jobs waiting and one running") {
