@@ -22,8 +22,9 @@ constexpr std::size_t kPiecesMax = 160;
 // In voxels: the field's bound is not lower than this from 0.1 m on. With mean distance m <= 0.87 voxels to the eight
 // centres around it, d_bound^2 >= d^2 - 2 d m.
 constexpr float kFieldSag = 1.3F;
-// Floats of a few metres and angles of some turns: points are off by some micrometres at most (a test says so).
+// Floats of a few metres, and of angles up to some turns: points are off by some ten micrometres at most.
 constexpr float kRounding_m = 1e-4F;
+constexpr double kAngleMax_rad = 30;
 constexpr float kFar_m = 1e3F;  // from any point that counts
 
 /// What a joint does behind its turn: Tz(d) Tx(a) Rx(alpha) Ry(beta) Rz(gamma).
@@ -406,15 +407,18 @@ void configurations_are_free(const ArmModel& arm, const Body& body, const FreeSp
   for (std::size_t first = 0; first < q_rad.size(); first += kLanes) {
     const std::size_t count = std::min<std::size_t>(kLanes, q_rad.size() - first);
     Floats angles_rad[kJointsMax]{};
+    std::array<bool, kLanes> fits{};  // the others are asked one by one
     for (std::size_t i = 0; i < count; ++i) {
-      for (int j = 0; j < arm.joints; ++j) angles_rad[j][i] = static_cast<float>(q_rad[first + i][j]);
+      const JointVector& q = q_rad[first + i];
+      fits[i] = within_limits(arm, q, kLimitMargin_rad) && q.max_abs() <= kAngleMax_rad;
+      for (int j = 0; j < arm.joints && fits[i]; ++j) angles_rad[j][i] = static_cast<float>(q[j]);
     }
     const Answer answer = avx2 ? decide_avx2(question, angles_rad) : decide_portable(question, angles_rad);
     for (std::size_t i = 0; i < count; ++i) {
-      const JointVector& q = q_rad[first + i];
-      const bool is_blocked = (answer.blocked >> i & 1) != 0;
-      const bool is_clear = (answer.free >> i & 1) != 0 && within_limits(arm, q, kLimitMargin_rad);
-      const bool is_free = is_clear || (!is_blocked && configuration_is_free(arm, body, space, clearance, q, margin_m));
+      const bool is_blocked = fits[i] && (answer.blocked >> i & 1) != 0;
+      const bool is_clear = fits[i] && (answer.free >> i & 1) != 0;
+      const bool is_free =
+          is_clear || (!is_blocked && configuration_is_free(arm, body, space, clearance, q_rad[first + i], margin_m));
       free[first + i] = is_free ? 1 : 0;
     }
   }

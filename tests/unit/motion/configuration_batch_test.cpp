@@ -1,6 +1,7 @@
 #include "algorithms/motion/configuration_batch.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <limits>
 
 #include "algorithms/kinematics/other_arms.hpp"
@@ -95,6 +96,30 @@ TEST_CASE("configurations at the edge of what is free are decided as each alone"
     }
   }
   CHECK(edges > 1000);
+}
+
+TEST_CASE("joints that have turned many times are decided as each alone") {
+  ArmModel arm = *find_arm_model("ur5");
+  const Body body = bare_body(arm);
+  for (std::size_t j = 0; j < 6; ++j) {
+    if (j != 2) arm.lower_rad[j] = -1e6, arm.upper_rad[j] = 1e6;
+  }
+  const RandomCell cell(2, 12);
+  FreeSpace space;
+  space.field = &cell.field;
+  Random random(4, 5);
+  for (const double turns : {4.0, 100.0, 1e5}) {
+    std::vector<JointVector> drawn;
+    for (int i = 0; i < 400; ++i) {
+      JointVector q = JointVector::zero(6);
+      for (int j = 0; j < 6; ++j) q[j] = random.uniform(-3, 3) + (j != 2 ? 6.283185307179586 * std::round(turns) : 0);
+      drawn.push_back(q);
+    }
+    const std::vector<std::uint8_t> free = ask(arm, body, space, drawn, 0.005);
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+      REQUIRE((free[i] != 0) == configuration_is_free(arm, body, space, kNeed, drawn[i], 0.005));
+    }
+  }
 }
 
 TEST_CASE("what is no configuration is not free") {
