@@ -145,7 +145,7 @@ TEST_CASE("the panel on a real controller's driver", "[panel]") {
   can::CanPanel panel(kernel(), options);
   RealClock clock;
   std::vector<hal::OperatorAction> keys;
-  const auto run = [&](double for_s, auto until) {
+  const auto run = [&](double for_s, const auto& until) {
     const Instant end = clock.now() + seconds(for_s);
     for (Instant now = clock.now(); now < end; now = clock.now()) {
       if (const auto key = panel.poll(now)) {
