@@ -47,7 +47,6 @@ std::vector<hal::Frame> frames_of(hal::FrameStream& camera, double for_s) {
 /// What holds of every camera: order, gaps that are counted, 32 frames held, sizes that are refused.
 template <typename Pixel, typename Camera>
 void check_camera(Camera& camera, double for_s) {
-  memory::reset_accounts();
   const std::vector<hal::Frame> frames = frames_of(camera, for_s);
   REQUIRE(frames.size() > 12);
   std::uint64_t left_out = frames.front().sequence;

@@ -84,10 +84,12 @@ int serve(const char* interface, const std::string& sheet, unsigned number, cons
   unsigned inputs = 1U << kStopBit;
   node.set_inputs(inputs);
   node.power(true);
+  constexpr std::int64_t kReopen_ns = 100'000'000;  // a bus that is down must not keep the computer's only core
   int bus = -1;
+  std::int64_t open_at_ns = 0;
   std::string typed, was;
   while (!stop_signal_received()) {
-    if (bus < 0) bus = open_bus(interface);
+    if (bus < 0 && monotonic_ns() >= open_at_ns) bus = open_bus(interface);
     std::array<pollfd, 2> waits{{{words, POLLIN, 0}, {bus, POLLIN, 0}}};
     (void)poll(waits.data(), waits.size(), kTurn_ms);
     std::array<char, 256> bytes;
@@ -106,6 +108,7 @@ int serve(const char* interface, const std::string& sheet, unsigned number, cons
     if (broken) {
       close(bus);
       bus = -1;
+      open_at_ns = monotonic_ns() + kReopen_ns;
     }
     if (std::string text = shown(node); text != was) {
       std::ofstream(status) << text << '\n';
