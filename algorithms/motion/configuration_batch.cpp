@@ -302,10 +302,12 @@ struct Segment {
   dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// As segment_distance_m: one point is the best for all of the other line, then each the best for the other.
+/// As segment_distance_m: one point is the best for all of the other line, then each the best for the other. Floats do
+/// not tell where axes that are nearly parallel come nearest: there the distance is too large by `excess_m` at most.
 [[gnu::always_inline]] inline void find_distance(const Segment& a, float aa, const Segment& b, float bb,
-                                                 Floats& distance_m) {
-  constexpr float kPoint_m2 = 1e-12F, kParallel = 1e-6F;
+                                                 Floats& distance_m, Floats& excess_m) {
+  constexpr float kPoint_m2 = 1e-12F, kParallel = 1e-4F;  // square of the sine
+  excess_m = Floats{};
   Lanes3 r;
   for (int i = 0; i < 3; ++i) r[i] = a.from[i] - b.from[i];
   Floats ar, br, ab;
@@ -318,6 +320,7 @@ struct Segment {
     const Ints crosses = det > kParallel * aa * bb;
     s = (ab * br - ar * bb) / (crosses ? det : 1.0F + Floats{});
     s = crosses ? s : Floats{};
+    excess_m = crosses ? Floats{} : std::sqrt(kParallel * std::max(aa, bb)) + Floats{};
     clamp_share(s);
   }
   if (bb > kPoint_m2) {
@@ -352,14 +355,14 @@ struct Segment {
   for (const Pair& pair : q.pairs) {
     const Segment &near = axes[pair.near], &far = axes[pair.far];
     Lanes3 between;
-    Floats distance_m;
+    Floats distance_m, excess_m;
     for (int k = 0; k < 3; ++k) between[k] = near.middle[k] - far.middle[k];
     multiply(between, between, distance_m);
     if (!any(~blocked & (distance_m < pair.balls_apart2_m2))) continue;
     find_distance(near, q.axes[static_cast<std::size_t>(pair.near)].length2_m2, far,
-                  q.axes[static_cast<std::size_t>(pair.far)].length2_m2, distance_m);
+                  q.axes[static_cast<std::size_t>(pair.far)].length2_m2, distance_m, excess_m);
     blocked |= distance_m < pair.apart_m - kRounding_m;
-    free &= distance_m > pair.apart_m + kRounding_m;
+    free &= distance_m - excess_m > pair.apart_m + kRounding_m;
     if (!any(~blocked)) return;
   }
 }
