@@ -1,7 +1,10 @@
-/// The driver of a UR robot on a controller whose time its client keeps: its network, that time as a clock, and the arm
-/// that lets it pass.
+/// The driver of a UR robot on a controller whose time its client keeps: its network, that time as a clock, the arm
+/// that lets it pass, and the pendant.
 #pragma once
 
+#include <algorithm>
+
+#include "hal/api/operator_devices.hpp"
 #include "hal/api/robot_arm.hpp"
 #include "hal/sim/ur_controller/stepped_links.hpp"
 #include "hal/ur/network.hpp"
@@ -66,6 +69,11 @@ class SteppedClock final : public Clock {
   sim::ur::SteppedLinks& links_;
 };
 
+/// When a device of the driver is to be looked at: it asks as one on a network, where something may come at any time.
+[[nodiscard]] inline Instant due_in_steps(Instant asked, const sim::ur::SteppedLinks& links) {
+  return asked > links.now() ? std::max(asked, links.next_cycle()) : asked;
+}
+
 /// The driver's arm; each look at it lets the robot run up to then.
 class SteppedArm final : public hal::RobotArm {
  public:
@@ -75,7 +83,7 @@ class SteppedArm final : public hal::RobotArm {
     links_.step_to(now);
     return driver_.poll(now);
   }
-  [[nodiscard]] Instant next_due() const override { return driver_.next_due(); }
+  [[nodiscard]] Instant next_due() const override { return due_in_steps(driver_.next_due(), links_); }
   [[nodiscard]] Status move(const hal::Segment& segment, Instant now) override { return driver_.move(segment, now); }
   void stop(Instant now) override { driver_.stop(now); }
   [[nodiscard]] hal::ArmCounters counters() const override { return driver_.counters(); }
@@ -83,6 +91,18 @@ class SteppedArm final : public hal::RobotArm {
  private:
   sim::ur::SteppedLinks& links_;
   hal::RobotArm& driver_;
+};
+
+class SteppedPendant final : public hal::Pendant {
+ public:
+  SteppedPendant(sim::ur::SteppedLinks& links, hal::Pendant& driver) : links_(links), driver_(driver) {}
+  [[nodiscard]] std::optional<hal::OperatorEvent> poll(Instant now) override { return driver_.poll(now); }
+  [[nodiscard]] Instant next_due() const override { return due_in_steps(driver_.next_due(), links_); }
+  void show(std::string_view line) override { driver_.show(line); }
+
+ private:
+  sim::ur::SteppedLinks& links_;
+  hal::Pendant& driver_;
 };
 
 }  // namespace firstlook

@@ -165,8 +165,7 @@ bool acts_on_arm(const Faults& f) {
   const Faults none;
   return f.link_lost_s != none.link_lost_s || f.protective_stop_s != none.protective_stop_s ||
          f.emergency_stop_s != none.emergency_stop_s || f.play_s != none.play_s || f.pause_s != none.pause_s ||
-         f.stop_s != none.stop_s || f.touch_mixed_up != none.touch_mixed_up ||
-         f.touch_left_there != none.touch_left_there;
+         f.stop_s != none.stop_s;
 }
 
 }  // namespace firstlook::sim

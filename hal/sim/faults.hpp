@@ -46,7 +46,7 @@ struct Faults {
 /// that is not a number in its range.
 [[nodiscard]] Result<Faults> parse_faults(std::string_view specification);
 
-/// Whether any of them happens to the arm, its link, or by a person's hand: not to cameras and cell alone.
+/// Whether any of them happens to the arm, its link or its pendant: not to cameras and cell alone.
 [[nodiscard]] bool acts_on_arm(const Faults& faults);
 
 }  // namespace firstlook::sim

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "hal/sim/joint_motion.hpp"
 #include "platform/core/ensure.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
@@ -15,7 +16,10 @@ void FollowedArm::advance(Instant now) {
   const memory::SimulationScope simulation;
   while (const auto sample = feed_.next()) {
     const Moment moment{clock_.to_ours(sample->there_s, now), sample->joints_rad};
-    if (watcher_ != nullptr) {
+    if (watcher_ != nullptr && sample->led) {
+      watcher_->body_led();
+      touches_ = false;
+    } else if (watcher_ != nullptr) {
       const JointVector& before_rad = count_ > 0 ? moments_[(count_ - 1) % kKept].joints_rad : moment.joints_rad;
       const bool touches = watcher_->body_moved(moment.stamp, before_rad, moment.joints_rad);
       if (touches && !touches_) feed_.touched();
@@ -25,7 +29,7 @@ void FollowedArm::advance(Instant now) {
   }
 }
 
-Instant FollowedArm::known_until() const { return count_ > 0 ? moments_[(count_ - 1) % kKept].stamp : Instant{-1}; }
+Instant FollowedArm::known_until() const { return count_ > 0 ? moment(0).stamp : Instant{-1}; }
 
 JointVector FollowedArm::true_joints(Instant stamp) const {
   ENSURE(5111, count_ > 0);
@@ -39,6 +43,15 @@ JointVector FollowedArm::true_joints(Instant stamp) const {
     return interpolate(before.joints_rad, after.joints_rad, share);
   }
   return moments_[oldest % kKept].joints_rad;
+}
+
+std::optional<double> FollowedArm::lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2,
+                                        Instant now) {
+  constexpr double kStanding_rad = 1e-4;  // between two samples: what rings down, and no motion
+  advance(now);
+  if (count_ < 2 || (moment(0).joints_rad - moment(1).joints_rad).max_abs() > kStanding_rad) return std::nullopt;
+  feed_.lead(to_rad, speed_rad_s, acceleration_rad_s2);
+  return movej(now, moment(0).joints_rad, to_rad, speed_rad_s, acceleration_rad_s2).duration_s();
 }
 
 Transform<Base, Flange> FollowedArm::true_flange(const JointVector& true_joints_rad) const {

@@ -18,6 +18,7 @@ class TrueJointFeed {
   struct Sample {
     double there_s = 0;  ///< on the clock over there
     JointVector joints_rad;
+    bool led = false;  ///< by a person's hand, or left where a hand led it
   };
   virtual ~TrueJointFeed() = default;
   /// The DH table that the true arm has.
@@ -26,6 +27,8 @@ class TrueJointFeed {
   [[nodiscard]] virtual std::optional<Sample> next() = 0;
   /// The body touches something: the arm over there feels it.
   virtual void touched() = 0;
+  /// A person leads the arm by hand; it does not follow where it may not move or moves already.
+  virtual void lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2) = 0;
 };
 
 class FollowedArm final : public TrueMotion {
@@ -40,12 +43,17 @@ class FollowedArm final : public TrueMotion {
   /// Between samples on a straight line; before the oldest kept it is that one.
   [[nodiscard]] JointVector true_joints(Instant stamp) const override;
   [[nodiscard]] Transform<Base, Flange> true_flange(const JointVector& true_joints_rad) const override;
+  [[nodiscard]] std::optional<double> lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2,
+                                           Instant now) override;
 
  private:
   struct Moment {
     Instant stamp{};
     JointVector joints_rad;
   };
+  /// Newest first; 0 is the newest.
+  [[nodiscard]] const Moment& moment(std::uint64_t back) const { return moments_[(count_ - 1 - back) % kKept]; }
+
   static constexpr std::size_t kKept = 1024;  // 8 s at 125 Hz; frames ask for the last tenths of a second
 
   TrueJointFeed& feed_;

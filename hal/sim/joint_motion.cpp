@@ -52,12 +52,18 @@ JointVector JointMotion::velocity_rad_s(Instant now) const {
 JointVector JointMotion::true_position_rad(Instant now) const {
   const JointVector commanded = position_rad(now);
   const double after_s = (now - start).seconds() - duration_s();
-  const double leading_rad = direction_rad.max_abs();
-  if (after_s < 0 || after_s > kRingForgotten_s || leading_rad <= 0) return commanded;
-  const double deceleration_rad_s2 = std::abs(phases[2].acceleration_1_s2) * leading_rad;
-  const double amplitude_rad = std::min(deceleration_rad_s2 / (kRing_rad_s * kRing_rad_s), kRingMax_rad);
+  if (after_s < 0 || after_s > kRingForgotten_s) return commanded;
+  return commanded + ring_down_rad(direction_rad * std::abs(phases[2].acceleration_1_s2), after_s);
+}
+
+JointVector ring_down_rad(const JointVector& deceleration_rad_s2, double after_s) {
+  const double leading_rad_s2 = deceleration_rad_s2.max_abs();
+  if (after_s < 0 || after_s > kRingForgotten_s || leading_rad_s2 <= 0) {
+    return JointVector::zero(deceleration_rad_s2.size());
+  }
+  const double amplitude_rad = std::min(leading_rad_s2 / (kRing_rad_s * kRing_rad_s), kRingMax_rad);
   const double swing_rad = amplitude_rad * std::exp(-after_s / kRingDecay_s) * std::sin(kRing_rad_s * after_s);
-  return commanded + direction_rad * (swing_rad / leading_rad);
+  return deceleration_rad_s2 * (swing_rad / leading_rad_s2);
 }
 
 JointMotion rest(Instant start, const JointVector& at_rad) {

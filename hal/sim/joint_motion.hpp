@@ -36,6 +36,10 @@ struct JointMotion {
   void path_at(double t_s, double& s, double& rate_1_s) const;
 };
 
+/// How far the structure swings beyond its rest, `after_s` after a motion that ended with these decelerations of the
+/// joints (rad/s², positive along the motion).
+[[nodiscard]] JointVector ring_down_rad(const JointVector& deceleration_rad_s2, double after_s);
+
 /// Stands still.
 [[nodiscard]] JointMotion rest(Instant start, const JointVector& at_rad);
 

@@ -17,6 +17,7 @@
 namespace firstlook::sim {
 
 inline constexpr Duration kReportPeriod = milliseconds(8);  // RTDE of a CB3 controller: 125 Hz
+inline constexpr double kEncoderSigma_rad = 2e-5;           // of what an arm says of its joints
 
 /// What a person or a mishap does to the controller.
 enum class ControllerAction : std::uint8_t { kPlay, kPause, kStop, kProtectiveStop, kEmergencyStop, kLinkLost };
@@ -33,7 +34,7 @@ struct SimulatedArmOptions {
   JointVector start_rad;
   std::uint64_t seed = 1;
   ControllerScript script;  ///< by time
-  double encoder_sigma_rad = 2e-5;
+  double encoder_sigma_rad = kEncoderSigma_rad;
   DeviationSigmas deviation;
 };
 
@@ -50,10 +51,8 @@ class SimulatedArm final : public hal::RobotArm, public TrueMotion {
   void stop(Instant now) override;
   [[nodiscard]] hal::ArmCounters counters() const override { return counters_; }
 
-  /// A person takes the arm by hand, in freedrive, straight to these joints. Returns how long that takes (s); empty
-  /// while a segment is executed. Until the next segment the body's motion is that person's.
   [[nodiscard]] std::optional<double> lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2,
-                                           Instant now);
+                                           Instant now) override;
   /// Lets the controller run up to `now`; reports pile up for poll.
   void advance(Instant now) override;
   [[nodiscard]] Instant known_until() const override { return simulated_; }

@@ -186,8 +186,8 @@ class Cell final : public SimulatedCell {
         rig_(model, scene_.mount, motion_),
         color_(color_timing(faults, options.seed), motion_, rig_, scenes_, description_.color, options.fast_sensor),
         depth_(depth_timing(faults, options.seed), motion_, rig_, scenes_, detail(options)),
-        hand_(scene_, model, faults, options.seed, arm_),
-        pendant_(pendant_script(faults), &hand_),
+        hand_(scene_, model, faults, options.seed, motion_),
+        pendant_(options.feed == nullptr ? pendant_script(faults) : OperatorScript{}, &hand_),
         panel_(panel_script(faults)) {}
 
   [[nodiscard]] const CellDescription& description() const override { return description_; }
@@ -221,20 +221,25 @@ class Cell final : public SimulatedCell {
 
 Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options) {
   const memory::SimulationScope simulation;
+  auto scene = load_cell(options.cell, options.seed, options.arm);
+  if (!scene) return std::unexpected(scene.error());
+  return make_simulated_cell(options, std::move(*scene));
+}
+
+Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options, Scene scene) {
+  const memory::SimulationScope simulation;
   const Result<Faults> faults = parse_faults(options.faults);
   if (!faults) return std::unexpected(faults.error());
-  Result<Scene> scene = load_cell(options.cell, options.seed, options.arm);
-  if (!scene) return std::unexpected(scene.error());
-  if (const Status hung = hang_boards(options.boards, *scene); !hung) return std::unexpected(hung.error());
-  if (scene->start_rad.size() != scene->arm.joints) {
-    return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene->name, scene->arm.joints);
+  if (const Status hung = hang_boards(options.boards, scene); !hung) return std::unexpected(hung.error());
+  if (scene.start_rad.size() != scene.arm.joints) {
+    return failure(Fault::kCellInvalid, "{}: start needs {} joint angles", scene.name, scene.arm.joints);
   }
-  ArmModel model = scene->arm;
+  ArmModel model = scene.arm;
   if (options.feed != nullptr) model.dh = options.feed->true_dh();
   const std::optional<SensorPreset> sensor = find_sensor_preset(options.sensor);
   if (!sensor) return failure(Fault::kUsage, "no depth sensor '{}'", options.sensor);
-  if (!scene->mount.depth_is_given) scene->mount.depth = sensor->intrinsics;
-  return std::make_unique<Cell>(*scene, depth_sensor_model(*sensor), model, *faults, options);
+  if (!scene.mount.depth_is_given) scene.mount.depth = sensor->intrinsics;
+  return std::make_unique<Cell>(scene, depth_sensor_model(*sensor), model, *faults, options);
 }
 
 }  // namespace firstlook::sim

@@ -68,7 +68,7 @@ class SimulatedCell {
  public:
   virtual ~SimulatedCell() = default;
   [[nodiscard]] virtual const CellDescription& description() const = 0;
-  /// Arm, pendant and person of a cell whose arm is moved elsewhere do nothing.
+  /// The arm of a cell whose arm is moved elsewhere does nothing, and its pendant has no keys but the person's Confirm.
   [[nodiscard]] virtual hal::RobotArm& arm() = 0;
   [[nodiscard]] virtual hal::ColorCamera& color() = 0;
   [[nodiscard]] virtual hal::DepthCamera& depth() = 0;
@@ -82,5 +82,7 @@ class SimulatedCell {
 /// specification that is not understood, kConfigBadValue for boards that the cell has no place for, kDataMissing for a
 /// file that cannot be opened. Faults of an arm that is moved elsewhere are up to who moves it.
 [[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options);
+/// The same from the scene that `load_cell` gave for `cell`, `seed` and `arm` of the options.
+[[nodiscard]] Result<std::unique_ptr<SimulatedCell>> make_simulated_cell(const SimulationOptions& options, Scene scene);
 
 }  // namespace firstlook::sim

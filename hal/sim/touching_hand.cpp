@@ -39,7 +39,7 @@ std::optional<int> point_named(std::string_view line, const BoardSpec& board) {
 }  // namespace
 
 TouchingHand::TouchingHand(const Scene& scene, const ArmModel& model, const Faults& faults, std::uint64_t seed,
-                           SimulatedArm& arm)
+                           TrueMotion& arm)
     : scene_(scene), model_(model), faults_(faults), arm_(arm), random_(seed, kTouchStream) {}
 
 void TouchingHand::read(std::string_view line) {
@@ -77,6 +77,7 @@ std::optional<hal::OperatorEvent> TouchingHand::poll(Instant now) {
 void TouchingHand::begin(Instant now) {
   doing_ = Doing::kNothing;
   due_ = kNeverDue;
+  arm_.advance(now);
   if (!home_rad_) home_rad_ = arm_.true_joints(now);
   std::optional<JointVector> target = home_rad_;
   if (asked_ == Asked::kTouch) {

@@ -7,7 +7,7 @@
 #include "hal/api/operator_devices.hpp"
 #include "hal/sim/faults.hpp"
 #include "hal/sim/scene.hpp"
-#include "hal/sim/simulated_arm.hpp"
+#include "hal/sim/true_motion.hpp"
 #include "platform/core/fixed_vector.hpp"
 #include "platform/core/random.hpp"
 
@@ -20,7 +20,8 @@ namespace firstlook::sim {
 class TouchingHand {
  public:
   /// Both must outlive it.
-  TouchingHand(const Scene& scene, const ArmModel& model, const Faults& faults, std::uint64_t seed, SimulatedArm& arm);
+  /// @param model  the true one
+  TouchingHand(const Scene& scene, const ArmModel& model, const Faults& faults, std::uint64_t seed, TrueMotion& arm);
 
   void read(std::string_view line);
   [[nodiscard]] std::optional<hal::OperatorEvent> poll(Instant now);
@@ -39,7 +40,7 @@ class TouchingHand {
   const Scene& scene_;
   const ArmModel model_;
   const Faults faults_;
-  SimulatedArm& arm_;
+  TrueMotion& arm_;
   Random random_;
   Doing doing_ = Doing::kNothing;
   Asked asked_ = Asked::kNothing;

@@ -1,5 +1,7 @@
-/// How the true body moves, as simulated cameras and the grader need it.
+/// How the true body moves, as simulated cameras and the grader need it, and the hand that leads it.
 #pragma once
+
+#include <optional>
 
 #include "platform/core/joint_vector.hpp"
 #include "platform/core/time.hpp"
@@ -32,6 +34,10 @@ class TrueMotion {
   [[nodiscard]] virtual JointVector true_joints(Instant stamp) const = 0;
   /// Where the flange truly is for true joint angles: the arm's own kinematics and its deviation from them. Any thread.
   [[nodiscard]] virtual Transform<Base, Flange> true_flange(const JointVector& true_joints_rad) const = 0;
+  /// A person takes the arm by hand, in freedrive, straight to these joints. Returns how long that takes (s); empty
+  /// while the arm moves. Until the program's next motion the body's is that person's.
+  [[nodiscard]] virtual std::optional<double> lead(const JointVector& to_rad, double speed_rad_s,
+                                                   double acceleration_rad_s2, Instant now) = 0;
 };
 
 }  // namespace firstlook::sim

@@ -58,12 +58,14 @@ Status check_mounting(const RtdeReport& report, bool upright) {
   const auto& g = *report.gravity_m_s2;
   const double size = std::hypot(g[0], g[1], g[2]);
   if (!(size > 1)) return {};  // nobody has told the controller
-  const double off_rad = std::acos(std::clamp(g[2] / size, -1.0, 1.0));
-  if ((off_rad <= kUpright_rad) == upright) return {};
+  // Either sign: a wrong guess would refuse every robot.
+  const double off_rad = std::acos(std::min(1.0, std::abs(g[2]) / size));
+  const bool plumb = off_rad <= kUpright_rad;
+  if (plumb || !upright) return {};
   return failure(Fault::kConfigBadValue,
-                 "arm.mounting is {}, the controller's installation has its base {:.0f} degrees from upright: correct "
-                 "Installation, Mounting on the pendant, or arm.mounting",
-                 upright ? "upright" : "tilted", 180 / M_PI * off_rad);
+                 "arm.mounting is upright, the controller's installation has its base {:.0f} degrees from plumb: "
+                 "correct Installation, Mounting on the pendant, or arm.mounting",
+                 180 / M_PI * off_rad);
 }
 
 Result<std::unique_ptr<NetworkRobot>> NetworkRobot::connect(Network& network, Clock& clock,

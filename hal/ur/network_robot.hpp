@@ -41,7 +41,8 @@ class NetworkRobot {
 /// Refuses another payload than expected (kg; below 0: any), and one that an older controller does not tell.
 [[nodiscard]] Status check_payload(const RtdeReport& report, double expected_kg);
 
-/// Refuses a mounting in the controller's installation that is not the configured one. A CB3 does not tell its own.
+/// Refuses an arm that is configured as upright where the controller's installation has it tilted. A CB3 does not tell.
+/// `target_gravity` counts without its sign, which UR's guide to RTDE does not give; so one that hangs passes, too.
 [[nodiscard]] Status check_mounting(const RtdeReport& report, bool upright);
 
 }  // namespace firstlook::ur

@@ -83,6 +83,9 @@ class WatchedFeed final : public sim::TrueJointFeed {
     return sample;
   }
   void touched() override { feed_.touched(); }
+  void lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2) override {
+    feed_.lead(to_rad, speed_rad_s, acceleration_rad_s2);
+  }
   [[nodiscard]] std::int64_t moved_ns() const { return moved_ns_; }
 
  private:

@@ -48,6 +48,7 @@ ArmMotion::ArmMotion(const ArmModel& arm, const JointVector& start_rad) : arm_(a
 void ArmMotion::place(const JointVector& at_rad) {
   position_rad_ = at_rad;
   lock();
+  slowing_rad_s2_ = velocity_rad_s_;
 }
 
 void ArmMotion::lock() {
@@ -63,6 +64,7 @@ void ArmMotion::come_to_rest() {
 
 ArmMotion::Ticket ArmMotion::begin(Mode mode) {
   mode_ = mode;
+  led_ = mode == Mode::kLed;
   path_time_s_ = 0;
   return ++ticket_;
 }
@@ -103,6 +105,15 @@ void ArmMotion::speedl(const Vector6& twist, double acceleration_m_s2) {
   acceleration_limit_ = acceleration_m_s2;
 }
 
+bool ArmMotion::lead(const JointVector& target_rad, double speed_rad_s, double acceleration_rad_s2) {
+  if (mode_ != Mode::kRest) return false;
+  const double way_rad = (target_rad - position_rad_).max_abs();
+  path_ = along(way_rad, speed_rad_s, acceleration_rad_s2, 0, position_rad_, target_rad);
+  static_cast<void>(begin(Mode::kLed));
+  scale_ = 1;
+  return true;
+}
+
 ArmMotion::Ticket ArmMotion::stop(double deceleration_rad_s2) {
   if (mode_ == Mode::kRest) return ticket_;
   if (mode_ != Mode::kStopping) stopped_mode_ = mode_;
@@ -115,6 +126,7 @@ ArmMotion::Ticket ArmMotion::stop(double deceleration_rad_s2) {
 }
 
 void ArmMotion::ramp_scale(double cycle_s, double speed_fraction) {
+  if (mode_ == Mode::kLed) return;
   if (mode_ == Mode::kRest) {
     scale_ = speed_fraction;
     return;
@@ -177,6 +189,7 @@ JointVector ArmMotion::next_on_line(std::optional<MotionFault>& fault) const {
 JointVector ArmMotion::next(double cycle_s, std::optional<MotionFault>& fault) {
   switch (mode_ == Mode::kStopping ? stopped_mode_ : mode_) {
     case Mode::kJointPath:
+    case Mode::kLed:
       path_time_s_ += scale_ * cycle_s;
       return path_.position_rad(Instant{} + seconds(path_time_s_));
     case Mode::kLinePath:
@@ -226,7 +239,28 @@ std::optional<MotionFault> ArmMotion::check(const JointVector& next_rad, double 
   return std::nullopt;
 }
 
+JointVector ArmMotion::true_position_rad() const {
+  return rested_s_ > 0 ? position_rad_ + ring_down_rad(slowing_rad_s2_, rested_s_) : position_rad_;
+}
+
+/// The structure swings once the arm has come to rest, by how hard it braked: the last cycle of a motion is not a whole
+/// one, the one before it tells.
+void ArmMotion::follow_structure(double cycle_s) {
+  if (mode_ == Mode::kRest || standing()) {
+    rested_s_ += cycle_s;
+  } else {
+    rested_s_ = 0;
+    slowing_rad_s2_ = acceleration_rad_s2_ * -1;
+  }
+}
+
 std::optional<MotionFault> ArmMotion::step(double cycle_s, double speed_fraction) {
+  const auto fault = advance(cycle_s, speed_fraction);
+  follow_structure(cycle_s);
+  return fault;
+}
+
+std::optional<MotionFault> ArmMotion::advance(double cycle_s, double speed_fraction) {
   ramp_scale(cycle_s, speed_fraction);
   if (mode_ == Mode::kRest) {
     velocity_rad_s_ = acceleration_rad_s2_ = JointVector::zero(position_rad_.size());
@@ -244,7 +278,7 @@ std::optional<MotionFault> ArmMotion::step(double cycle_s, double speed_fraction
   velocity_rad_s_ = velocity_rad_s;
   position_rad_ = next_rad;
 
-  const bool on_path = mode_ == Mode::kJointPath || mode_ == Mode::kLinePath;
+  const bool on_path = mode_ == Mode::kJointPath || mode_ == Mode::kLinePath || mode_ == Mode::kLed;
   if (on_path && path_time_s_ >= path_.duration_s()) come_to_rest();
   if (mode_ == Mode::kStopping && standing()) come_to_rest();
   return std::nullopt;

@@ -33,12 +33,13 @@ class ArmMotion {
   void speedj(const JointVector& speed_rad_s, double acceleration_rad_s2);
   /// The same for the flange: m/s and rad/s in Base, m/s².
   void speedl(const Vector6& twist, double acceleration_m_s2);
+  /// A person's hand leads the arm in freedrive, straight in joint space, whatever slider and pauses say. False while
+  /// anything else moves it.
+  bool lead(const JointVector& target_rad, double speed_rad_s, double acceleration_rad_s2);
   /// Brakes with this deceleration (rad/s²), on the path where there is one. Done when the arm stands.
   Ticket stop(double deceleration_rad_s2);
   /// Brakes on the path and waits there, until let go.
   void hold(bool held) { held_ = held; }
-  /// At once at rest: the power is off, or the brakes are in.
-  void lock();
   /// Puts a standing arm elsewhere, without a motion: for tests and cells.
   void place(const JointVector& at_rad);
 
@@ -48,22 +49,31 @@ class ArmMotion {
   [[nodiscard]] bool done(Ticket ticket) const { return ticket < ticket_ || mode_ == Mode::kRest; }
   /// A path or a speed is under way: nobody else may start one.
   [[nodiscard]] bool busy() const { return mode_ != Mode::kRest; }
+  /// A hand leads the arm now.
+  [[nodiscard]] bool in_hand() const { return mode_ == Mode::kLed; }
+  /// A hand moved it last.
+  [[nodiscard]] bool led() const { return led_; }
   [[nodiscard]] bool standing() const { return velocity_rad_s_.max_abs() < 1e-9; }
   [[nodiscard]] const JointVector& position_rad() const { return position_rad_; }
+  /// Where the joints truly are: after a motion the structure swings about its rest.
+  [[nodiscard]] JointVector true_position_rad() const;
   [[nodiscard]] const JointVector& velocity_rad_s() const { return velocity_rad_s_; }
   [[nodiscard]] const JointVector& acceleration_rad_s2() const { return acceleration_rad_s2_; }
   /// How fast the path's own time runs: the slider, ramped, 0 while held.
   [[nodiscard]] double scale() const { return scale_; }
 
  private:
-  enum class Mode : std::uint8_t { kRest, kJointPath, kLinePath, kServo, kJointSpeed, kFlangeSpeed, kStopping };
+  enum class Mode : std::uint8_t { kRest, kJointPath, kLinePath, kServo, kJointSpeed, kFlangeSpeed, kLed, kStopping };
 
   Ticket begin(Mode mode);
+  void lock();  ///< at once at rest
   [[nodiscard]] JointVector next(double cycle_s, std::optional<MotionFault>& fault);
   [[nodiscard]] JointVector next_on_line(std::optional<MotionFault>& fault) const;
   [[nodiscard]] JointVector toward_speed(const JointVector& speed_rad_s, double cycle_s) const;
   [[nodiscard]] JointVector flange_speed(std::optional<MotionFault>& fault) const;
   [[nodiscard]] std::optional<MotionFault> check(const JointVector& next_rad, double cycle_s) const;
+  [[nodiscard]] std::optional<MotionFault> advance(double cycle_s, double speed_fraction);
+  void follow_structure(double cycle_s);
   void ramp_scale(double cycle_s, double speed_fraction);
   void come_to_rest();
 
@@ -72,9 +82,12 @@ class ArmMotion {
   Mode stopped_mode_ = Mode::kRest;  ///< what kStopping brakes on
   Ticket ticket_ = 0;
   bool held_ = false;
+  bool led_ = false;
   double scale_ = 1;
   double braking_1_s_ = 0;  ///< of the scale, while stopping on a path
   JointVector position_rad_, velocity_rad_s_, acceleration_rad_s2_;
+  JointVector slowing_rad_s2_;  ///< decelerations of the last whole cycle of a motion
+  double rested_s_ = 0;         ///< since the arm came to rest; 0 while it moves
 
   JointMotion path_;  ///< along joints, or along metres and radians of the line as its one "joint"
   double path_time_s_ = 0;

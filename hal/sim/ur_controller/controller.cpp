@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/sim/random_streams.hpp"
+#include "platform/core/random.hpp"
+
 namespace firstlook::sim::ur {
 namespace {
 
@@ -18,6 +21,9 @@ constexpr double kBoot_s = 10;    // real ones take about a minute
 
 constexpr double kProgramStop_rad_s2 = 10;
 constexpr double kProtectiveStop_rad_s2 = 20;
+// The power is off and the brakes fall in: 0.70 rad of the shoulder at 180 deg/s are v² / 2 theta = 7 rad/s² (CB3
+// manual, appendix A, category 0 stops). Rounded down.
+constexpr double kBrakes_rad_s2 = 6;
 
 Vector6 vector_of_joints(const JointVector& q) {
   Vector6 v{};
@@ -55,7 +61,8 @@ void Controller::power_on() {
 void Controller::power_off() {
   if (booting()) return;
   stop();
-  motion_.lock();
+  motion_.hold(false);
+  static_cast<void>(motion_.stop(kBrakes_rad_s2));
   state_.robot_mode = RobotMode::kPowerOff;
   releasing_ = false;
   mode_until_ = 0;
@@ -194,6 +201,33 @@ void Controller::place(const JointVector& at_rad) {
   report_arm();
 }
 
+bool Controller::lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2) {
+  const SafetyMode safety = state_.safety_mode;
+  const bool safe = safety == SafetyMode::kNormal || safety == SafetyMode::kReduced;
+  if (!safe || state_.robot_mode != RobotMode::kRunning || !to_rad.all_finite()) return false;
+  return motion_.lead(to_rad, speed_rad_s, acceleration_rad_s2);
+}
+
+void Controller::set_encoders(double sigma_rad, std::uint64_t seed) {
+  encoder_sigma_rad_ = sigma_rad;
+  encoder_seed_ = seed;
+}
+
+/// Drawn for the cycle, not one after the other: who asks how often changes nothing.
+Vector6 Controller::measured_q_rad() const {
+  Vector6 measured = state_.q_rad;
+  if (encoder_sigma_rad_ <= 0) return measured;
+  Random noise(encoder_seed_ ^ mix64(state_.control_step), kEncoderStream);
+  for (double& q : measured) q += encoder_sigma_rad_ * noise.normal();
+  return measured;
+}
+
+Vector6 Controller::measured_tcp_pose() const {
+  if (encoder_sigma_rad_ <= 0) return state_.tcp_pose;
+  const Vector6 q = measured_q_rad();
+  return vector_of(tcp_pose({q[0], q[1], q[2], q[3], q[4], q[5]}));
+}
+
 void Controller::set_speed_slider(double fraction) {
   if (std::isfinite(fraction)) state_.speed_slider = std::clamp(fraction, 0.0, 1.0);
 }
@@ -270,6 +304,7 @@ void Controller::step() {
   state_.speed_scaling = state_.robot_mode == RobotMode::kRunning ? motion_.scale() : 0;
   advance_runtime();
   report_arm();
+  state_.freedrive = motion_.in_hand();
 }
 
 }  // namespace firstlook::sim::ur

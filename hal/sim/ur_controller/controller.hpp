@@ -66,6 +66,12 @@ class Controller {
 
   /// Puts a standing arm elsewhere.
   void place(const JointVector& at_rad);
+  /// Somebody holds the pendant's freedrive button and leads the arm there. False where the arm may not move, or a
+  /// program moves it.
+  bool lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2);
+  /// What its encoders show differs from the joints by noise of this sigma, another in each cycle; without this call by
+  /// nothing.
+  void set_encoders(double sigma_rad, std::uint64_t seed);
 
   // What programs and clients change.
   [[nodiscard]] ArmMotion& motion() { return motion_; }
@@ -80,6 +86,9 @@ class Controller {
   void set_tcp_offset(const Vector6& flange_T_tcp);
   void set_script_line(std::uint32_t line) { state_.script_line = line; }
 
+  /// What is said of the actual joints, with the encoders' noise, and the pose of the TCP by them.
+  [[nodiscard]] Vector6 measured_q_rad() const;
+  [[nodiscard]] Vector6 measured_tcp_pose() const;
   /// base_T_tcp of these joints.
   [[nodiscard]] Pose tcp_pose(const JointVector& q_rad) const;
   [[nodiscard]] Pose flange_T_tcp() const { return pose_of(state_.tcp_offset); }
@@ -101,6 +110,8 @@ class Controller {
   std::uint64_t protective_since_ = 0;
   SafetyMode emergency_ = SafetyMode::kNormal;  ///< the button that is pressed
   bool resume_after_safeguard_ = false;
+  double encoder_sigma_rad_ = 0;
+  std::uint64_t encoder_seed_ = 0;
   bool arm_reported_ = false;  ///< poses are those of the joints
 };
 

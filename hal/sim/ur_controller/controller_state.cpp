@@ -5,7 +5,8 @@ namespace firstlook::sim::ur {
 std::uint32_t robot_status_bits(const ControllerState& state) {
   const std::uint32_t power = state.powered() ? 1 : 0;
   const std::uint32_t running = state.program_running() ? 1 : 0;
-  return power | running << 1;
+  const std::uint32_t teach = state.freedrive ? 1 : 0;
+  return power | running << 1 | teach << 2;
 }
 
 std::uint32_t safety_status_bits(const ControllerState& state) {

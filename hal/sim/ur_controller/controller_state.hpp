@@ -74,6 +74,7 @@ struct ControllerState {
   Vector3 gravity_m_s2{0, 0, 9.82};
   InputsOutputs io;
   Registers inputs, outputs;
+  bool freedrive = false;         ///< its button is pressed
   std::uint32_t script_line = 0;  ///< that has the arm under its control; 0 for none
 
   [[nodiscard]] bool powered() const { return robot_mode == RobotMode::kIdle || robot_mode == RobotMode::kRunning; }

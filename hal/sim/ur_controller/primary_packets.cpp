@@ -52,9 +52,10 @@ void mode_data(const Controller& controller, WireWriter& wire) {
 void joint_data(const Controller& controller, WireWriter& wire) {
   const ControllerState& s = controller.state();
   const Vector6 currents_a = joint_currents_a(s);
+  const Vector6 actual_rad = controller.measured_q_rad();
   const Packet packet(wire, 1);
   for (std::size_t j = 0; j < kJoints; ++j) {
-    wire.f64(s.q_rad[j]);
+    wire.f64(actual_rad[j]);
     wire.f64(s.q_rad[j]);
     wire.f64(s.qd_rad_s[j]);
     wire.f32(currents_a[j]);
@@ -108,7 +109,7 @@ void masterboard_data(const Controller& controller, WireWriter& wire) {
 
 void cartesian_info(const Controller& controller, WireWriter& wire) {
   const Packet packet(wire, 4);
-  wire.f64s(controller.state().tcp_pose);
+  wire.f64s(controller.measured_tcp_pose());
   wire.f64s(controller.state().tcp_offset);
 }
 
@@ -160,10 +161,10 @@ void force_mode_data(const Controller& controller, WireWriter& wire) {
   wire.f64(0);
 }
 
-void additional_info(WireWriter& wire) {
+void additional_info(const Controller& controller, WireWriter& wire) {
   const Packet packet(wire, 8);
-  wire.u8(0);       // freedrive button pressed
-  wire.flag(true);  // enabled
+  wire.flag(controller.state().freedrive);  // its button is pressed
+  wire.flag(true);                          // enabled
   wire.flag(false);
   wire.u8(0);
 }
@@ -232,7 +233,7 @@ std::string robot_state_message(const Controller& controller) {
     kinematics_info(controller, wire);
     configuration_data(controller, wire);
     force_mode_data(controller, wire);
-    additional_info(wire);
+    additional_info(controller, wire);
     if (controller.identity().series == Series::kESeries) {
       tool_communication_info(wire);
       tool_mode_info(wire);

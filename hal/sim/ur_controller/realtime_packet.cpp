@@ -23,11 +23,11 @@ void append_realtime_packet(const Controller& controller, std::string& out) {
   wire.f64s(s.qdd_rad_s2);
   wire.f64s(currents_a);
   wire.f64s(joint_moments_nm(s));
-  wire.f64s(s.q_rad);
+  wire.f64s(controller.measured_q_rad());
   wire.f64s(s.qd_rad_s);
   wire.f64s(currents_a);
   wire.f64s(currents_a);  // control output
-  wire.f64s(s.tcp_pose);
+  wire.f64s(controller.measured_tcp_pose());
   wire.f64s(s.tcp_speed);
   wire.f64s(s.external_wrench);
   wire.f64s(s.tcp_pose);

@@ -45,8 +45,10 @@ void none_u32(C, int, W wire) { wire.u32(0); }
 void none_u8(C, int, W wire) { wire.u8(0); }
 void none_i32(C, int, W wire) { wire.i32(0); }
 void q(C c, int, W wire) { wire.f64s(c.state().q_rad); }
+void measured_q(C c, int, W wire) { wire.f64s(c.measured_q_rad()); }
 void qd(C c, int, W wire) { wire.f64s(c.state().qd_rad_s); }
 void tcp_pose(C c, int, W wire) { wire.f64s(c.state().tcp_pose); }
+void measured_tcp_pose(C c, int, W wire) { wire.f64s(c.measured_tcp_pose()); }
 void tcp_speed(C c, int, W wire) { wire.f64s(c.state().tcp_speed); }
 void tcp_force(C c, int, W wire) { wire.f64s(c.state().external_wrench); }
 void currents(C c, int, W wire) { wire.f64s(joint_currents_a(c.state())); }
@@ -62,12 +64,12 @@ constexpr OutputRow kOutputs[] = {
     {"target_qdd", T::kVector6d, kAlways, [](C c, int, W w) { w.f64s(c.state().qdd_rad_s2); }},
     {"target_current", T::kVector6d, kAlways, currents},
     {"target_moment", T::kVector6d, kAlways, [](C c, int, W w) { w.f64s(joint_moments_nm(c.state())); }},
-    {"actual_q", T::kVector6d, kAlways, q},
+    {"actual_q", T::kVector6d, kAlways, measured_q},
     {"actual_qd", T::kVector6d, kAlways, qd},
     {"actual_current", T::kVector6d, kAlways, currents},
     {"actual_current_window", T::kVector6d, kAlways, none6},
     {"joint_control_output", T::kVector6d, kAlways, currents},
-    {"actual_TCP_pose", T::kVector6d, kAlways, tcp_pose},
+    {"actual_TCP_pose", T::kVector6d, kAlways, measured_tcp_pose},
     {"actual_TCP_speed", T::kVector6d, kAlways, tcp_speed},
     {"actual_TCP_force", T::kVector6d, kAlways, tcp_force},
     {"target_TCP_pose", T::kVector6d, kAlways, tcp_pose},

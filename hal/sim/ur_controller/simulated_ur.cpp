@@ -37,6 +37,7 @@ SimulatedUr::SimulatedUr(const ControllerIdentity& identity, const SimulatedUrOp
     : controller_(identity), programs_(controller_, options.programs) {
   dashboard_.remote_control = options.remote_control;
   if (options.start_rad) controller_.place(*options.start_rad);
+  controller_.set_encoders(options.encoder_sigma_rad, options.encoder_seed);
   if (!options.running) return;
   controller_.release_brakes();
   while (controller_.state().robot_mode != RobotMode::kRunning) controller_.step();

@@ -35,7 +35,9 @@ struct SimulatedUrOptions {
   std::vector<StoredProgram> programs;     ///< that `load` finds
   bool running = false;                    ///< starts with the brakes released instead of without power
   std::optional<JointVector> start_rad{};  ///< where the arm stands at first
-  bool remote_control = true;              ///< what an e-Series answers; it takes the network's Play in both
+  double encoder_sigma_rad = 0;            ///< of what is said of the actual joints
+  std::uint64_t encoder_seed = 0;
+  bool remote_control = true;  ///< what an e-Series answers; it takes the network's Play in both
 };
 
 class SimulatedUr {

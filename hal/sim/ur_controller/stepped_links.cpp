@@ -16,7 +16,7 @@ void SteppedLinks::ask(std::uint8_t what, Id link) {
 
 void SteppedLinks::begin() {
   const memory::SimulationScope simulation;
-  time_ = {};
+  time_ = next_cycle_ = {};
   WireWriter(asked_).u8(static_cast<std::uint8_t>(Ask::kBegin));
 }
 
@@ -39,7 +39,11 @@ Status SteppedLinks::read(std::string_view told) {
   WireReader wire(told);
   while (true) {
     const auto what = static_cast<Tell>(wire.u8());
-    if (what == Tell::kReached && wire.rest().empty()) return {};
+    if (what == Tell::kReached) {
+      next_cycle_ = Instant{static_cast<std::int64_t>(wire.u64())};
+      if (wire.ok() && wire.rest().empty()) return {};
+      return failure(Fault::kDataMalformed, "the robot's answer to a turn is none");
+    }
     Link& link = links_[wire.u8()];
     switch (what) {
       case Tell::kOpen:

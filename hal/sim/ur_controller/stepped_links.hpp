@@ -31,6 +31,8 @@ class SteppedLinks {
   /// Lets the controller run until then; an instant that is not later than the last changes nothing.
   void step_to(Instant now);
   [[nodiscard]] Instant now() const { return time_; }
+  /// When something can come next: not before the controller's next cycle has ended.
+  [[nodiscard]] Instant next_cycle() const { return next_cycle_; }
   /// Why turns are no longer taken.
   [[nodiscard]] const Status& health() const { return health_; }
 
@@ -54,7 +56,7 @@ class SteppedLinks {
 
   TakeTurn turn_;
   Status health_;
-  Instant time_{};
+  Instant time_{}, next_cycle_{};
   std::string asked_, told_;
   std::map<Id, Link> links_;
 };

@@ -133,6 +133,7 @@ void SteppedService::tell(std::string& told) {
     }
   }
   wire.u8(static_cast<std::uint8_t>(Tell::kReached));
+  wire.u64(static_cast<std::uint64_t>((time_ + robot_.cycle()).ns));
 }
 
 void SteppedService::drop_if_done(Links::iterator link) {

@@ -25,13 +25,13 @@ enum class Ask : std::uint8_t {
   kClose = 'C',   ///< u8 link
   kStepTo = 'A',  ///< u64 ns: the controller runs until then
 };
-/// Told: what came of it; kReached is the last.
+/// Told: what came of it; kReached is the last, with when there can be more.
 enum class Tell : std::uint8_t {
   kOpen = 'O',     ///< u8 link
   kDialled = 'I',  ///< u8 link, u16 port: a script dials
   kCame = 'B',     ///< u8 link, u32 count, bytes
   kEnded = 'E',    ///< u8 link: closed over there, and all bytes have come
-  kReached = '.',
+  kReached = '.',  ///< u64 ns: the end of the next control cycle
 };
 
 /// Deterministic: the same turns get the same answers, in process or in two.

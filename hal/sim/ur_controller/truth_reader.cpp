@@ -7,6 +7,7 @@
 #include "hal/sim/ur_controller/truth_session.hpp"
 #include "hal/sim/ur_controller/wire.hpp"
 #include "platform/linux/wakeup.hpp"
+#include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook::sim::ur {
 namespace {
@@ -47,9 +48,17 @@ std::optional<TrueJointFeed::Sample> TruthReader::next() {
   if (end_ - begin_ < kTruthSampleBytes) return std::nullopt;
   WireReader wire(std::string_view(bytes_.data() + begin_, kTruthSampleBytes));
   begin_ += kTruthSampleBytes;
-  Sample sample{wire.f64(), JointVector::zero(6)};
+  Sample sample{.there_s = wire.f64(), .joints_rad = JointVector::zero(6)};
   for (int j = 0; j < 6; ++j) sample.joints_rad[j] = wire.f64();
+  sample.led = wire.u8() != 0;
   return sample;
+}
+
+void TruthReader::touched() { send(std::string_view(&kTouched, 1)); }
+
+void TruthReader::lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2) {
+  const memory::SimulationScope simulation;
+  send(lead_message(to_rad, speed_rad_s, acceleration_rad_s2));
 }
 
 Status TcpTruth::connect(TcpStream stream) {
@@ -61,8 +70,6 @@ Status TcpTruth::connect(TcpStream stream) {
   }
   return {};
 }
-
-void TcpTruth::touched() { stream_.send(std::string_view(&kTouched, 1)); }
 
 Status SteppedTruth::connect() {
   link_ = links_.dial(Port::kTruth);
@@ -77,8 +84,6 @@ Status SteppedTruth::connect() {
   }
   return greeting == kTruthGreeting && read_head() ? Status{} : no_truth();
 }
-
-void SteppedTruth::touched() { links_.send(link_, std::string_view(&kTouched, 1)); }
 
 Result<PrivateChannel> connect_private_channel(const std::string& host, std::uint16_t port) {
   const Result<TcpAddress> address = look_up_tcp(host, port);

@@ -14,9 +14,12 @@ class TruthReader : public TrueJointFeed {
  public:
   [[nodiscard]] const std::array<DhRow, kJointsMax>& true_dh() const override { return dh_; }
   [[nodiscard]] std::optional<Sample> next() override;
+  void touched() override;
+  void lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2) override;
 
  protected:
   [[nodiscard]] virtual std::string_view receive(std::span<char> room) = 0;
+  virtual void send(std::string_view bytes) = 0;
   /// True when something came.
   bool fill();
   /// Once the head has come: the DH table. False: it has not yet.
@@ -33,9 +36,9 @@ class TcpTruth final : public TruthReader {
  public:
   /// Reads the DH table; blocks for seconds at most. Error: kDeviceMissing when it does not come.
   [[nodiscard]] Status connect(TcpStream stream);
-  void touched() override;
 
  private:
+  void send(std::string_view bytes) override { stream_.send(bytes); }
   [[nodiscard]] std::string_view receive(std::span<char> room) override { return stream_.receive(room); }
   TcpStream stream_;
 };
@@ -47,9 +50,9 @@ class SteppedTruth final : public TruthReader {
   explicit SteppedTruth(SteppedLinks& links) : links_(links) {}
   /// The same, in the robot's time, which goes on meanwhile.
   [[nodiscard]] Status connect();
-  void touched() override;
 
  private:
+  void send(std::string_view bytes) override { links_.send(link_, bytes); }
   [[nodiscard]] std::string_view receive(std::span<char> room) override { return links_.receive(link_, room); }
   SteppedLinks& links_;
   SteppedLinks::Id link_ = SteppedLinks::kNone;

@@ -6,6 +6,7 @@
 
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 #include "hal/sim/ur_controller/truth_reader.hpp"
+#include "hal/sim/ur_controller/truth_session.hpp"
 
 namespace firstlook::sim {
 namespace {
@@ -98,6 +99,85 @@ TEST_CASE("a touch that is felt stops the robot protectively", "[sim]") {
   ur::Session& session = robot.open(ur::Port::kTruth);
   session.receive("T");
   CHECK(robot.controller().state().safety_mode == ur::SafetyMode::kProtectiveStop);
+}
+
+TEST_CASE("a hand leads the robot by the private channel: cut anywhere, and told with the true joints", "[sim]") {
+  ur::SimulatedUrOptions options;
+  options.running = true;
+  ur::SimulatedUr robot(*ur::identify_controller("ur5", 0, ""), options);
+  ur::Session& session = robot.open(ur::Port::kTruth);
+  const JointVector there = robot.controller().motion().position_rad() * 0.9;
+  const auto led = [&] {  // what the newest sample says
+    robot.step();
+    const std::string& told = session.output();
+    return told.at(told.size() - 1) == 1;
+  };
+  CHECK_FALSE(led());
+  const std::string message = ur::lead_message(there, 0.8, 2);
+  REQUIRE(message.size() == ur::kLeadBytes);
+  session.receive(message.substr(0, 20));
+  session.receive(message.substr(20));
+  for (int i = 0; i < 400; ++i) CHECK(led());
+  CHECK((robot.controller().motion().position_rad() - there).max_abs() < 1e-12);
+  robot.controller().motion().movej(there * 0.95, 1.0, 1.4, 0);
+  CHECK_FALSE(led());
+  session.receive("?");
+  CHECK(session.over());
+}
+
+namespace {
+
+/// Joints as a test says, and what a hand asked for.
+struct Feed final : TrueJointFeed {
+  std::array<DhRow, kJointsMax> dh{};
+  std::vector<Sample> samples;
+  std::vector<JointVector> leads;
+  int touches = 0;
+  [[nodiscard]] const std::array<DhRow, kJointsMax>& true_dh() const override { return dh; }
+  [[nodiscard]] std::optional<Sample> next() override {
+    if (samples.empty()) return std::nullopt;
+    const Sample sample = samples.front();
+    samples.erase(samples.begin());
+    return sample;
+  }
+  void touched() override { ++touches; }
+  void lead(const JointVector& to_rad, double, double) override { leads.push_back(to_rad); }
+};
+
+}  // namespace
+
+TEST_CASE("what a hand does to a followed arm is not the program's doing, and one that moves is not taken", "[sim]") {
+  const ArmModel model = *find_arm_model("ur5");
+  Feed feed;
+  struct Watcher final : BodyWatcher {
+    bool body_moved(Instant, const JointVector&, const JointVector&) override {
+      ++moved;
+      return true;
+    }
+    void body_led() override { ++led; }
+    int moved = 0, led = 0;
+  } watcher;
+  FollowedArm arm(feed, model, 1, {}, &watcher);
+  const JointVector here = default_start(model);
+  JointVector there = here;
+  there[0] += 0.5;
+  const auto at = [](double s) { return Instant{seconds(s).ns}; };
+  CHECK_FALSE(arm.lead(there, 0.8, 2, at(0)));
+  feed.samples = {{0.008, here}, {0.016, here * 0.99}};
+  CHECK_FALSE(arm.lead(there, 0.8, 2, at(0.016)));
+  feed.samples = {{0.024, here}, {0.032, here}};
+  const auto takes_s = arm.lead(there, 0.8, 2, at(0.032));
+  REQUIRE(takes_s);
+  CHECK(*takes_s == Approx(0.5 / 0.8 + 0.8 / 2).margin(1e-6));
+  REQUIRE(feed.leads.size() == 1);
+  CHECK(feed.leads[0] == there);
+  CHECK(watcher.moved == 4);
+  CHECK(feed.touches == 1);
+  feed.samples = {{0.040, here, true}, {0.048, there, true}, {0.056, there, false}};
+  arm.advance(at(0.056));
+  CHECK(watcher.led == 2);
+  CHECK(watcher.moved == 5);
+  CHECK(feed.touches == 2);  // the program's motion is judged afresh
 }
 
 TEST_CASE("who is no such channel is refused", "[sim]") {

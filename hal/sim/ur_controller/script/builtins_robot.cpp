@@ -10,8 +10,10 @@ namespace firstlook::sim::ur::script {
 namespace {
 
 void joint_positions(Call& c) { c.answer(list_of(c.robot().q_rad)); }
+void actual_joint_positions(Call& c) { c.answer(list_of(c.controller().measured_q_rad())); }
 void joint_speeds(Call& c) { c.answer(list_of(c.robot().qd_rad_s)); }
 void joint_accelerations(Call& c) { c.answer(list_of(c.robot().qdd_rad_s2)); }
+void actual_tcp_pose(Call& c) { c.answer(PoseValue{c.controller().measured_tcp_pose()}); }
 void tcp_pose(Call& c) { c.answer(PoseValue{c.robot().tcp_pose}); }
 void tcp_speed(Call& c) { c.answer(list_of(c.robot().tcp_speed)); }
 void tcp_force(Call& c) { c.answer(list_of(c.robot().external_wrench)); }
@@ -102,10 +104,10 @@ void nothing(Call&) {}
 
 constexpr Builtin kTable[] = {
     {"force", "", force},
-    {"get_actual_joint_positions", "", joint_positions},
-    {"get_actual_joint_positions_history", "steps=0", joint_positions},
+    {"get_actual_joint_positions", "", actual_joint_positions},
+    {"get_actual_joint_positions_history", "steps=0", actual_joint_positions},
     {"get_actual_joint_speeds", "", joint_speeds},
-    {"get_actual_tcp_pose", "", tcp_pose},
+    {"get_actual_tcp_pose", "", actual_tcp_pose},
     {"get_actual_tcp_speed", "", tcp_speed},
     {"get_actual_tool_flange_pose", "", flange_pose},
     {"get_controller_temp", "", [](Call& c) { c.answer(kBoardTemperature_c); }},

@@ -190,4 +190,68 @@ TEST_CASE("a joint that would leave its range is a fault", "[ur]") {
   CHECK(arm.motion.position_rad()[5] <= 6.2832);
 }
 
+TEST_CASE("after a motion the structure swings as that of a cell's own arm, while it moves not at all", "[ur]") {
+  Arm arm;
+  arm.slider = GENERATE(1.0, 0.5);
+  const JointVector from = arm.motion.position_rad(), target = arm.ahead(1);
+  static_cast<void>(arm.motion.movej(target, 0.5, 1.4, 0));
+  while (arm.motion.busy()) {
+    REQUIRE_FALSE(arm.motion.step(kCycle_s, arm.slider));
+    if (arm.motion.busy()) REQUIRE(arm.motion.true_position_rad() == arm.motion.position_rad());
+  }
+  sim::JointMotion own = sim::movej(Instant{}, from, target, 0.5 * arm.slider, 1.4 * arm.slider * arm.slider);
+  const Instant end{seconds(own.duration_s()).ns};
+  double largest_rad = 0;
+  for (int i = 1; i < 300; ++i) {
+    const JointVector swing = arm.motion.true_position_rad() - arm.motion.position_rad();
+    const JointVector owns = own.true_position_rad(end + seconds(i * kCycle_s)) - target;
+    CHECK((swing - owns).max_abs() < 8e-5);  // it ended within a cycle
+    largest_rad = std::max(largest_rad, swing.max_abs());
+    arm.run(kCycle_s);
+  }
+  CHECK(largest_rad > 1e-4);
+  arm.run(2);
+  CHECK(arm.motion.true_position_rad() == target);
+}
+
+TEST_CASE("an arm that brakes on its path swings by how hard it brakes", "[ur]") {
+  Arm arm;
+  static_cast<void>(arm.motion.movej(arm.ahead(2), 1, 1.4, 0));
+  arm.run(1.2);
+  static_cast<void>(arm.motion.stop(1.5));
+  arm.run_until_rest();
+  double largest_rad = 0;
+  for (int i = 0; i < 100; ++i) {
+    arm.run(kCycle_s);
+    largest_rad = std::max(largest_rad, std::abs(arm.motion.true_position_rad()[0] - arm.motion.position_rad()[0]));
+  }
+  const sim::JointMotion braked = sim::movej(Instant{}, JointVector{0}, JointVector{2}, 1, 1.5);
+  double owns_rad = 0;
+  for (int i = 0; i < 100; ++i) {
+    const Instant at{seconds(braked.duration_s() + i * kCycle_s).ns};
+    owns_rad = std::max(owns_rad, std::abs(braked.true_position_rad(at)[0] - 2));
+  }
+  CHECK(largest_rad == Approx(owns_rad).epsilon(0.02));
+}
+
+TEST_CASE("a hand leads a standing arm, whatever the slider says; a program's motion is its own again", "[ur]") {
+  Arm arm;
+  arm.slider = 0.1;
+  const JointVector target = arm.ahead(0.8);
+  REQUIRE(arm.motion.lead(target, 0.8, 2));
+  CHECK(arm.motion.in_hand());
+  CHECK_FALSE(arm.motion.lead(arm.ahead(0), 0.8, 2));
+  arm.motion.hold(true);  // the program is paused
+  CHECK(arm.run_until_rest() == Approx(0.8 / 0.8 + 0.8 / 2).margin(0.003));
+  CHECK((arm.motion.position_rad() - target).max_abs() < 1e-12);
+  CHECK_FALSE(arm.motion.in_hand());
+  CHECK(arm.motion.led());
+  arm.slider = 1;
+  arm.run(0.1);
+  static_cast<void>(arm.motion.movej(arm.ahead(-0.5), 0.5, 1, 0));
+  CHECK_FALSE(arm.motion.led());
+  CHECK_FALSE(arm.motion.lead(target, 0.8, 2));
+  CHECK(arm.run_until_rest() < 2);
+}
+
 }  // namespace firstlook

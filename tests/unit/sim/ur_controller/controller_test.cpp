@@ -93,6 +93,23 @@ TEST_CASE("an emergency stop takes the power; releasing it does not bring it bac
   CHECK(controller.state().robot_mode == RobotMode::kPowerOff);
 }
 
+TEST_CASE("an arm whose power goes brakes on its path", "[ur]") {
+  UrRobot robot("ur5");
+  Controller& controller = robot.robot.controller();
+  JointVector target = controller.motion().position_rad();
+  target[0] += 2;
+  controller.play();
+  static_cast<void>(controller.motion().movej(target, 1, 2, 0));
+  robot.run(1);
+  const double at_rad = controller.motion().position_rad()[0];
+  controller.emergency_stop(true);
+  robot.run(1);
+  CHECK(controller.motion().standing());
+  CHECK(controller.motion().position_rad()[0] - at_rad == Approx(1 / (2.0 * 6)).margin(0.008));  // v² / 2a, and a cycle
+  CHECK(controller.motion().position_rad()[1] == target[1]);
+  CHECK(controller.state().runtime == RuntimeState::kStopped);
+}
+
 TEST_CASE("a safeguard stop pauses, and what played goes on when it closes", "[ur]") {
   UrRobot robot("ur3");
   Controller& controller = robot.robot.controller();
@@ -153,6 +170,51 @@ TEST_CASE("a seed draws a factory correction, the same each time", "[ur]") {
   CHECK(other.serial == "2014350001");
   CHECK(first.serial.starts_with("20"));
   CHECK_FALSE(identify_controller("ur6", 0, ""));
+}
+
+TEST_CASE("encoders are as noisy as asked for, the same for everybody in a cycle", "[ur]") {
+  UrRobot robot("ur5");
+  Controller& controller = robot.robot.controller();
+  const Vector6 exact = controller.state().q_rad;
+  CHECK(controller.measured_q_rad() == exact);
+  CHECK(controller.measured_tcp_pose() == controller.state().tcp_pose);
+  constexpr double kSigma_rad = 2e-5;
+  controller.set_encoders(kSigma_rad, 3);
+  double sum = 0, squared = 0;
+  Vector6 before{};
+  constexpr int kCycles = 2000;
+  for (int i = 0; i < kCycles; ++i) {
+    controller.step();
+    const Vector6 measured = controller.measured_q_rad();
+    REQUIRE(measured == controller.measured_q_rad());
+    REQUIRE(measured != before);
+    before = measured;
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      sum += (measured[j] - exact[j]) / kSigma_rad;
+      squared += std::pow((measured[j] - exact[j]) / kSigma_rad, 2);
+    }
+  }
+  constexpr double kCount = 6.0 * kCycles;
+  CHECK(std::abs(sum / kCount) < 4 / std::sqrt(kCount));
+  CHECK(std::abs(squared / kCount - 1) < 4 * std::sqrt(2 / kCount));
+  CHECK(controller.measured_tcp_pose() != controller.state().tcp_pose);
+  CHECK(controller.state().q_rad == exact);
+}
+
+TEST_CASE("a hand leads the arm only where it may move, and the freedrive button is told", "[ur]") {
+  UrRobot robot("ur5");
+  Controller& controller = robot.robot.controller();
+  const JointVector there = controller.motion().position_rad() * 0.9;
+  REQUIRE(controller.lead(there, 0.8, 2));
+  controller.step();
+  CHECK(robot_status_bits(controller.state()) == (1U | 1U << 2));
+  robot.run(3);
+  CHECK(robot_status_bits(controller.state()) == 1);
+  CHECK((controller.motion().position_rad() - there).max_abs() < 1e-12);
+  controller.protective_stop("a test");
+  CHECK_FALSE(controller.lead(there * 0.9, 0.8, 2));
+  UrRobot off("ur5", false);
+  CHECK_FALSE(off.robot.controller().lead(there, 0.8, 2));
 }
 
 }  // namespace firstlook
