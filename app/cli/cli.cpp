@@ -96,15 +96,16 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->check(CLI::IsMember({"full", "fast"}));
   run_app->add_option("--out", run.out, "folder of the run (default runs/<date>-<seed>); must be new or empty");
   run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
-  run_app->add_option("--robot", robot,
-                      "address of a Universal Robots controller that moves the arm (robot.host), at the pace of the "
-                      "clock; what the cameras see of it is simulated: `firstlook ur-sim --cell ...` there, with "
-                      "--lockstep in virtual time; simulated: such a controller in this process");
+  run_app->add_option(
+      "--robot", robot,
+      "who moves the arm (robot.host): the address of a Universal Robots controller, at the pace of the "
+      "clock, where what the cameras see of it is simulated by `firstlook ur-sim --cell ...` there, with "
+      "--lockstep in virtual time; simulated: such a controller in this process; auto: that where "
+      "the arm is a UR; none: the cell itself, without a controller");
   run_app
-      ->add_option(
-          "--robot-at", run.robot_happens,
-          "with --robot simulated: SECONDS=WHAT happens to the controller, such as 20=reboot; may be repeated; "
-          "`firstlook ur-sim --at help` tells what can")
+      ->add_option("--robot-at", run.robot_happens,
+                   "SECONDS=WHAT happens to the simulated controller, such as 20=reboot; may be repeated; "
+                   "`firstlook ur-sim --at help` tells what can")
       ->allow_extra_args(false);
   run_app->add_flag("--record", run.record,
                     "keep the views of the board as a dataset that `firstlook calibrate` reads");
@@ -249,7 +250,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   ur_sim_app
       ->add_flag("--lockstep", ur_sim.lockstep,
                  "with --cell: the robot's time is the virtual one of `firstlook run --robot`, so that a run of two "
-                 "processes gives the same bytes as one with `--robot simulated`")
+                 "processes gives the same bytes as one")
       ->needs(ur_sim_app->get_option("--cell"));
   ur_sim_app
       ->add_option(

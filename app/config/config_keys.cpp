@@ -70,7 +70,8 @@ void add_robot_keys(Keys& keys, Config& c) {
                   0,
                   {},
                   "name or address of a Universal Robots controller, CB3 or e-Series; simulated: one in this process, "
-                  "whose protocols are spoken; none: the simulated cell's own arm"});
+                  "whose protocols are spoken; auto: that where the simulated cell's arm is a UR; none: the cell's own "
+                  "arm"});
   keys.push_back({"robot.own_address",
                   &c.robot.own_address,
                   0,

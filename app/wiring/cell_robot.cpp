@@ -1,5 +1,6 @@
 #include "app/wiring/cell_robot.hpp"
 
+#include "app/wiring/job_site.hpp"
 #include "app/wiring/simulated_ur.hpp"
 #include "hal/sim/simulated_operator.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -20,35 +21,54 @@ Result<sim::ur::Timetable> timetable_of(const RunCommand& command, const sim::Fa
   return timetable;
 }
 
+bool has_controller(const sim::Scene& scene) {
+  return scene.arm_file.empty() && sim::ur::identify_controller(scene.arm.name.view(), 0, "").has_value();
+}
+
+/// What only a controller has.
+Status refuse_for_own_arm(const RunCommand& command, const Config& config, const sim::Scene& scene) {
+  if (!command.robot_happens.empty()) {
+    return failure(Fault::kUsage, "--robot-at is for a simulated controller: none moves the arm ({}) of this cell",
+                   scene.arm.name.view());
+  }
+  if (config.robot.calibration_file != "none") {
+    return failure(Fault::kConfigBadValue, "robot.calibration_file: no controller moves the arm ({}) of this cell",
+                   scene.arm.name.view());
+  }
+  return {};
+}
+
 }  // namespace
 
-Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, const Config& config) {
-  if (const Status fits = refuse_other_arms(config); !fits) return std::unexpected(fits.error());
-  if (config.calibration.touch_test == "yes") {
-    return failure(Fault::kUsage, "calibration.touch_test: the simulated person leads the cell's own arm only");
+Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, const Config& config,
+                                                   const sim::Scene& scene) {
+  const memory::SimulationScope simulation;
+  const std::string& host = config.robot.host;
+  if (!config.robot.given() || (host == kWhereItCan && !has_controller(scene))) {
+    if (const Status fits = refuse_for_own_arm(command, config, scene); !fits) return std::unexpected(fits.error());
+    return nullptr;
   }
-  if (!command.robot_happens.empty() && config.robot.host != kInProcess) {
+  if (const Status fits = refuse_other_arms(config); !fits) return std::unexpected(fits.error());
+  if (!command.robot_happens.empty() && names_network_robot(config)) {
     return failure(Fault::kUsage, "--robot-at is for --robot {}: `ur-sim` has --at of its own", kInProcess);
   }
-  const memory::SimulationScope simulation;
   const auto faults = sim::parse_faults(command.faults);
   if (!faults) return std::unexpected(faults.error());
   std::unique_ptr<CellRobot> robot(new CellRobot);
   auto timetable = timetable_of(command, *faults);
   if (!timetable) return std::unexpected(timetable.error());
-  const Status found = config.robot.host == kInProcess ? robot->start_in_process(std::move(*timetable), config)
-                                                       : robot->find_on_network(*faults, config);
+  const Status found = names_network_robot(config) ? robot->find_on_network(*faults, config)
+                                                   : robot->start_in_process(std::move(*timetable), config, scene);
   if (!found) return std::unexpected(found.error());
   return robot;
 }
 
-Status CellRobot::start_in_process(sim::ur::Timetable timetable, const Config& config) {
+Status CellRobot::start_in_process(sim::ur::Timetable timetable, const Config& config, const sim::Scene& scene) {
   UrSimCommand words;
-  words.cell = config.cell;
   words.seed = static_cast<std::uint64_t>(config.seed);
   words.running = true;
   words.external_control = fmt::format("{}:{}", kOwnHost, config.robot.program_port);
-  auto controller = make_simulated_ur(words);
+  auto controller = make_simulated_ur(words, &scene);
   if (!controller) return std::unexpected(controller.error());
   controller_ = std::move(*controller);
   service_ = std::make_unique<sim::ur::SteppedService>(*controller_, std::move(timetable));
@@ -99,6 +119,7 @@ Status CellRobot::connect(const Config& config, Narrator& narrator) {
   links_->begin();
   while (truth_->next()) continue;  // where it stood before
   stepped_.emplace(*links_, arm_->arm());
+  stepped_pendant_.emplace(*links_, arm_->pendant());
   return {};
 }
 

@@ -25,8 +25,9 @@ class JobSite {
   virtual void finish(const Cart& cart, const Config& config, RunRecord& record, Narrator& narrator) = 0;
 };
 
-/// A simulated cell; with `robot.host` its arm is the robot there, a simulated one that tells the cell's cameras its
-/// true joints. Fills in `config` what the cell's description says.
+/// A simulated cell. Its arm is moved by the cell itself, or as `robot.host` says by a simulated controller that tells
+/// the cell's cameras its true joints: in this process (where it can be: for UR arms), or in another.
+/// Fills in `config` what the cell's description says, and `robot.host`.
 [[nodiscard]] Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, Config& config,
                                                                    Narrator& narrator);
 

@@ -8,6 +8,7 @@
 
 #include "algorithms/kinematics/factory_kinematics.hpp"
 #include "app/config/ur_calibration_file.hpp"
+#include "app/wiring/job_site.hpp"
 #include "hal/ur/modes.hpp"
 #include "hal/ur/tcp_network.hpp"
 
@@ -78,9 +79,10 @@ Result<std::unique_ptr<NetworkArm>> NetworkArm::connect(const Config& config, Na
   auto measured = arm->measure(identity, config);
   if (!measured) return std::unexpected(measured.error());
   arm->model_ = *measured;
-  narrator.line(fmt::format("robot     {} at {}, serial number {}, kinematics as its factory measured them{}",
-                            config.arm.model, config.robot.host, identity.serial_number(),
-                            arm->file_ ? fmt::format(", from {}, as the controller has them", arm->file_->path) : ""));
+  narrator.line(fmt::format(
+      "robot     {} {}, serial number {}, kinematics as its factory measured them{}", config.arm.model,
+      names_network_robot(config) ? "at " + config.robot.host : "with a simulated controller", identity.serial_number(),
+      arm->file_ ? fmt::format(", from {}, as the controller has them", arm->file_->path) : ""));
   return arm;
 }
 

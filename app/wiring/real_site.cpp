@@ -82,7 +82,8 @@ Status refuse_what_does_not_fit(const RunCommand& command, const Config& config)
 }  // namespace
 
 bool names_network_robot(const Config& config) {
-  return config.robot.given() && config.robot.host != CellRobot::kInProcess;
+  const std::string& host = config.robot.host;
+  return config.robot.given() && host != CellRobot::kInProcess && host != CellRobot::kWhereItCan;
 }
 
 bool names_real_cart(const Config& config) { return config.camera.device != "none" || config.depth.device != "none"; }

@@ -3,7 +3,9 @@
 #include "app/wiring/cell_grading.hpp"
 #include "app/wiring/cell_robot.hpp"
 #include "app/wiring/job_site.hpp"
+#include "app/wiring/persons_pendant.hpp"
 #include "app/wiring/real_devices.hpp"
+#include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {
 namespace {
@@ -11,14 +13,16 @@ namespace {
 class SimulatedSite final : public JobSite {
  public:
   SimulatedSite(std::unique_ptr<CellRobot> robot, std::unique_ptr<sim::SimulatedCell> cell, OpenedPanel panel)
-      : robot_(std::move(robot)), cell_(std::move(cell)), panel_(std::move(panel.panel)), telling_(panel.telling) {}
+      : robot_(std::move(robot)), cell_(std::move(cell)), panel_(std::move(panel.panel)), telling_(panel.telling) {
+    if (robot_) pendant_.emplace(robot_->pendant(), cell_->pendant());
+  }
   ~SimulatedSite() override { cell_->grader().watch(nullptr); }
 
   CartDevices devices() override {
     return {robot_ ? robot_->arm() : cell_->arm(),
             cell_->color(),
             cell_->depth(),
-            robot_ ? robot_->pendant() : cell_->pendant(),
+            pendant_ ? static_cast<hal::Pendant&>(*pendant_) : cell_->pendant(),
             panel_ ? *panel_ : cell_->panel(),
             telling_};
   }
@@ -41,7 +45,8 @@ class SimulatedSite final : public JobSite {
  private:
   std::unique_ptr<CellRobot> robot_;  ///< moves the arm; null: the cell's own does
   std::unique_ptr<sim::SimulatedCell> cell_;
-  std::shared_ptr<hal::Panel> panel_;  ///< a real one in place of the cell's
+  std::optional<PersonsPendant> pendant_;  ///< where a robot moves the arm
+  std::shared_ptr<hal::Panel> panel_;      ///< a real one in place of the cell's
   TellingDevices telling_;
   std::optional<KnownFree> known_free_;
 };
@@ -54,23 +59,30 @@ Result<ArmModel> read_arm(const std::string& path, const Config::Arm& config, Na
   return read->arm;
 }
 
+Result<sim::Scene> load_scene(const Config& config, const sim::ArmChoice& choice) {
+  const memory::SimulationScope simulation;
+  return sim::load_cell(config.cell, static_cast<std::uint64_t>(config.seed), choice);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, Config& config, Narrator& narrator) {
-  std::unique_ptr<CellRobot> robot;
-  if (!config.robot.given() && !command.robot_happens.empty()) {
-    return failure(Fault::kUsage, "--robot-at is for --robot {}", CellRobot::kInProcess);
-  }
-  if (config.robot.given()) {
-    auto found = CellRobot::find(command, config);
-    if (!found) return std::unexpected(found.error());
-    robot = std::move(*found);
-  }
   const sim::ArmChoice choice = {config.arm.file == "none" ? "" : config.arm.file,
                                  [&](const std::string& path) { return read_arm(path, config.arm, narrator); }};
-  auto cell = sim::make_simulated_cell({config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor,
-                                        command.faults, config.workers, configured_boards(config), config.depth.sensor,
-                                        robot ? &robot->truth() : nullptr, choice});
+  auto scene = load_scene(config, choice);
+  if (!scene) return std::unexpected(scene.error());
+  auto found = CellRobot::find(command, config, *scene);
+  if (!found) return std::unexpected(found.error());
+  std::unique_ptr<CellRobot> robot = std::move(*found);
+  if (config.robot.host == CellRobot::kWhereItCan) {
+    if (!robot)
+      narrator.line(fmt::format("robot     {}: the cell's own arm, no UR controller", scene->arm.name.view()));
+    config.robot.host = robot ? CellRobot::kInProcess : "none";
+  }
+  auto cell = sim::make_simulated_cell(
+      {config.cell, static_cast<std::uint64_t>(config.seed), command.fast_sensor, command.faults, config.workers,
+       configured_boards(config), config.depth.sensor, robot ? &robot->truth() : nullptr, choice},
+      std::move(*scene));
   if (!cell) return std::unexpected(cell.error());
   describe_cell((*cell)->description(), config);
   auto panel = open_panel(config);

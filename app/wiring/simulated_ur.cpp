@@ -29,19 +29,23 @@ Result<sim::ur::ExternalControl> external_control_of(const std::string& text) {
 
 }  // namespace
 
-Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimCommand& command) {
+Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimCommand& command, const sim::Scene* scene) {
   sim::ur::SimulatedUrOptions options;
   std::string model = command.model;
-  if (!command.cell.empty()) {
-    const auto scene = sim::load_cell(command.cell, command.seed);
-    if (!scene) return std::unexpected(scene.error());
+  if (scene != nullptr) {
+    if (!scene->arm_file.empty()) {
+      return failure(Fault::kUsage, "the arm of {} is read from {}: no controller is simulated for it", scene->name,
+                     scene->arm_file);
+    }
     model = scene->arm.name.view();
     options.start_rad = scene->start_rad;
+    options.encoder_sigma_rad = sim::kEncoderSigma_rad;
+    options.encoder_seed = command.seed;
     options.remote_control = false;  // somebody stands at its pendant
   }
   const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);
-  if (!identity && !command.cell.empty())
-    return failure(identity.error().fault, "the arm of {}: {}", command.cell, identity.error().detail());
+  if (!identity && scene != nullptr)
+    return failure(identity.error().fault, "the arm of {}: {}", scene->name, identity.error().detail());
   if (!identity) return std::unexpected(identity.error());
   const bool somebody_plays = command.play_after_s >= 0 || command.lockstep;
   options.running = command.running || somebody_plays;
@@ -65,7 +69,13 @@ int run_ur_sim(const UrSimCommand& command) {
     std::printf("%s", sim::ur::happenings_in_words().c_str());
     return kExitDone;
   }
-  const auto robot = make_simulated_ur(command);
+  std::optional<sim::Scene> scene;
+  if (!command.cell.empty()) {
+    auto loaded = sim::load_cell(command.cell, command.seed);
+    if (!loaded) return fail(loaded.error());
+    scene = std::move(*loaded);
+  }
+  const auto robot = make_simulated_ur(command, scene ? &*scene : nullptr);
   if (!robot) return fail(robot.error());
   constexpr double kPlay_s = 0.5;  // as the operator of a simulated cell
   const double play_after_s = command.lockstep && command.play_after_s < 0 ? kPlay_s : command.play_after_s;

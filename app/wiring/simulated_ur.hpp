@@ -4,12 +4,15 @@
 #include <memory>
 
 #include "app/cli/cli.hpp"
+#include "hal/sim/scene.hpp"
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 
 namespace firstlook {
 
-/// Errors: those of the cell, of the programs' files, and kUsage for words that are not understood.
-[[nodiscard]] Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimCommand& command);
+/// @param scene  the cell whose arm it is: it stands as that does, and its encoders are as noisy; null: it is alone
+/// Errors: those of the programs' files, and kUsage for words that are not understood.
+[[nodiscard]] Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimCommand& command,
+                                                                              const sim::Scene* scene);
 
 /// `firstlook ur-sim`. @return the exit code
 int run_ur_sim(const UrSimCommand& command);

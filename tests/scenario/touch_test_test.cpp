@@ -34,9 +34,10 @@ double norm(const Json& v) {
 TEST_CASE("a calibration is touched before it counts, and replays", "[scenario]") {
   const JobFolder folder;
   const std::string tip = GENERATE("given", "estimate");
+  const std::string robot = tip == "given" ? "simulated" : "none";
   CAPTURE(tip);
   // The third touch is made on another corner than was asked for.
-  const ProgramResult run = calibrate_by_touch(folder, "out", tip, {"--faults", "touch.mixed_up=3"});
+  const ProgramResult run = calibrate_by_touch(folder, "out", tip, {"--robot", robot, "--faults", "touch.mixed_up=3"});
   INFO(run.err);
   REQUIRE(run.exit_code == 0);
   const Json result = folder.read_json("out/result.json");
