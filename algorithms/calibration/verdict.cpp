@@ -85,18 +85,23 @@ void hold_out(const Validation& validation, HandEyeResult& result) {
 }
 
 /// Returns how many of the solves failed.
-int spread_of_subsets(const Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
+int spread_of_subsets(const Validation& validation, const HandEyeOptions& options, RunParallel run_parallel,
+                      HandEyeResult& result) {
   ViewSubsets subsets(validation.stations, options.subset_share, options.seed);
+  std::vector<Indices> drawn;
+  for (int i = 0; i < options.subset_solves; ++i) drawn.push_back(subsets.next());
+  std::vector<std::optional<Transform<Flange, Camera>>> solutions(drawn.size());
+  run_parallel(static_cast<int>(drawn.size()), [&](int index, int) {
+    const auto i = static_cast<std::size_t>(index);
+    const auto is_drawn = [&](std::size_t s) { return std::binary_search(drawn[i].begin(), drawn[i].end(), s); };
+    if (const auto solved = validation.resolve(validation.views_of(is_drawn))) solutions[i] = solved->flange_T_camera;
+  });
   double squared_m = 0, squared_rad = 0;
   result.subset_solutions.clear();
-  result.subset_solutions.reserve(static_cast<std::size_t>(std::max(0, options.subset_solves)));
-  for (int i = 0; i < options.subset_solves; ++i) {
-    const Indices drawn = subsets.next();
-    const auto is_drawn = [&](std::size_t s) { return std::binary_search(drawn.begin(), drawn.end(), s); };
-    const auto subset = validation.resolve(validation.views_of(is_drawn));
-    if (!subset) continue;
-    result.subset_solutions.push_back(subset->flange_T_camera);
-    const Vector6d d = pose_difference(subset->flange_T_camera.pose(), result.flange_T_camera.pose());
+  for (const auto& solution : solutions) {
+    if (!solution) continue;
+    result.subset_solutions.push_back(*solution);
+    const Vector6d d = pose_difference(solution->pose(), result.flange_T_camera.pose());
     squared_m += d.head<3>().squaredNorm();
     squared_rad += d.tail<3>().squaredNorm();
   }
@@ -136,24 +141,28 @@ std::string weakest_direction(const Eigen::Matrix3d& covariance) {
 void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, HandEyeResult& result) {
   std::vector<std::string>& reasons = result.reasons;
   reasons.clear();
+  result.only_last_contradicts = false;
   const auto gated = std::count_if(result.fits.begin(), result.fits.end(), [](const ViewFit& f) { return !f.used; });
   if (result.views < limits.views_min) {
     reasons.push_back(fmt::format("{} usable views, {} are the least", result.views, limits.views_min));
   }
   if (static_cast<double>(gated) > limits.gated_views_max * static_cast<double>(result.fits.size())) {
     reasons.push_back(fmt::format("{} of {} views contradict the others", gated, result.fits.size()));
-  } else if (gated > limits.gated_at_end_max) {
+  } else if (gated > 0) {
     // In the order in which they were taken.
     const auto used = [](const ViewFit& f) { return f.used; };
     const auto first_used = std::ranges::find_if(result.fits, used);
     const auto before = std::distance(result.fits.begin(), first_used);
     const auto last_used = std::find_if(result.fits.rbegin(), result.fits.rend(), used);
     const auto after = std::distance(result.fits.rbegin(), last_used);
-    if (before == gated || after == gated) {
+    const bool first_wrong = before == gated && gated > limits.gated_first_max;
+    const bool last_wrong = after == gated && gated > limits.gated_last_max;
+    if (first_wrong || last_wrong) {
       reasons.push_back(fmt::format(
           "the {} {} of {} views contradict all others: the board, or the camera on the arm, was moved in between",
-          after == gated ? "last" : "first", gated, result.fits.size()));
+          last_wrong ? "last" : "first", gated, result.fits.size()));
     }
+    result.only_last_contradicts = last_wrong && gated == 1;
   }
   if (result.holdout_rms_m == 0) {
     reasons.emplace_back("too few views to hold any out");
@@ -172,7 +181,7 @@ void judge(const VerdictLimits& limits, int failed_subsets, int subset_solves, H
   result.verdict = reasons.empty() ? Verdict::kAccepted : Verdict::kRejected;
 }
 
-void validate(Validation& validation, const HandEyeOptions& options, HandEyeResult& result) {
+void validate(Validation& validation, const HandEyeOptions& options, RunParallel run_parallel, HandEyeResult& result) {
   result.holdout_rms_px = result.holdout_rms_m = 0;
   result.subset_spread_m = result.subset_spread_rad = 0;
   result.holdout_px.clear();
@@ -180,7 +189,7 @@ void validate(Validation& validation, const HandEyeOptions& options, HandEyeResu
   validation.stations = station_count(validation.station);
   if (validation.squared_px) result.holdout_px.resize(validation.views_given);
   hold_out(validation, result);
-  const int failed = spread_of_subsets(validation, options, result);
+  const int failed = spread_of_subsets(validation, options, run_parallel, result);
   result.usable_distance_m = usable_distance(result.flange_T_camera, result.covariance, options.limits.tolerance_m);
   judge(options.limits, failed, options.subset_solves, result);
 }
@@ -365,7 +374,7 @@ Result<HandEyeResult> solve_hand_eye(const CameraIntrinsics& camera, const Targe
 }
 
 void validate_hand_eye(const CameraIntrinsics& given, const Targets& targets, std::span<const CalibrationView> views,
-                       const HandEyeOptions& options, HandEyeResult& result) {
+                       const HandEyeOptions& options, HandEyeResult& result, RunParallel run_parallel) {
   const CameraIntrinsics& camera = result.intrinsics ? result.camera : given;
   const UsedViews used = select_views(camera, targets, views, result.fits, result.flange_T_camera);
   const RefinementOptions quick = short_options(options, result);
@@ -387,7 +396,7 @@ void validate_hand_eye(const CameraIntrinsics& given, const Targets& targets, st
     return squared_error_px(r.camera, targets[used.views[i].target], used.views[i], r.flange_T_camera,
                             r.targets[target].base_T_board);
   };
-  validate(validation, options, result);
+  validate(validation, options, run_parallel, result);
   const UsedViews all = select_views(camera, targets, views, {}, result.flange_T_camera);
   if (targets.size() == 1) {
     name_mistake(all.pairs, &targets[0], [&] { return find_likely_mistake(camera, targets[0], views); }, result);
@@ -462,7 +471,7 @@ Result<HandEyeResult> calibrate_hand_eye_from_pairs(std::span<const PosePair> pa
     for (const std::size_t i : indices) some.push_back(validation.pairs[i]);
     return refine_from_pairs(some, result.flange_T_camera, quick);
   };
-  validate(validation, options, result);
+  validate(validation, options, run_serially, result);
   name_mistake(pairs, nullptr, [&] { return find_likely_mistake(pairs); }, result);
   return result;
 }

@@ -11,6 +11,7 @@
 #include "algorithms/calibration/hand_eye_refinement.hpp"
 #include "algorithms/calibration/likely_mistake.hpp"
 #include "algorithms/calibration/touch_test.hpp"
+#include "platform/core/parallel.hpp"
 
 namespace firstlook {
 
@@ -24,8 +25,10 @@ struct VerdictLimits {
   double subset_spread_max_m = 0.003;  ///< RMS distance of 100 solves on 70 % of the views from the whole
   double gated_views_max = 0.25;       ///< share of the views that may be wrong
   /// As many of the first, or of the last, may be wrong: more in a row, with all others right, say that something moved
-  /// while views were taken, however few they are.
-  int gated_at_end_max = 1;
+  /// while views were taken, however few they are. After the first nothing moved any more, and the others tell what
+  /// holds now; of the last it may be the one that does.
+  int gated_first_max = 1;
+  int gated_last_max = 1;
   double voxel_size_m = 0.05;  ///< mapping: 3 sigma at mapping_distance_m within half of it
   double mapping_distance_m = 1.5;
   double tolerance_m = 0.01;  ///< of the gripper, for the usable distance (thesis eq. 7-2)
@@ -80,6 +83,8 @@ struct HandEyeResult {
   std::vector<std::optional<double>> holdout_px;
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons;  ///< why rejected; empty when accepted
+  /// Rejected for one view, the last: more views would tell whether it is wrong by itself or something has moved.
+  bool only_last_contradicts = false;
   /// What people most likely did wrong; also the last of the reasons when rejected. Of an accepted calibration: what is
   /// wrong with the views that were left out. Empty when nothing was found.
   std::optional<LikelyMistake> likely_mistake;
@@ -111,7 +116,7 @@ struct TouchRecord {
                                                    std::span<const CalibrationView> views,
                                                    const HandEyeOptions& options = {});
 void validate_hand_eye(const CameraIntrinsics& camera, const Targets& targets, std::span<const CalibrationView> views,
-                       const HandEyeOptions& options, HandEyeResult& result);
+                       const HandEyeOptions& options, HandEyeResult& result, RunParallel run_parallel = run_serially);
 
 /// The touch test of a validated calibration: fills touch_test and rejects where it does not agree.
 /// @param used  the pose pairs that it was solved from (used_pairs), or more of the same target

@@ -33,14 +33,21 @@ class SpeedSearch {
  public:
   SpeedSearch(const ArmModel& arm, const Capsules& body, const JointVector& from, const JointVector& to)
       : arm_(arm), body_(body), from_(from), dq_(to - from) {
-    for (std::size_t i = 0; i < body.size(); ++i) {
-      const Capsule& c = body[i];
-      bends_.push_back(second_derivative_bound(lever_arms(arm, c), c.link, dq_, c.radius_m));
-    }
+    bends_.resize(body.size());
+  }
+
+  /// The highest speed that any point of the body has at these places.
+  double reached_at(std::initializer_list<double> places) {
+    for (const double t : places) look(t, 0);
+    return reached_;
   }
 
   double bound() {
-    for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) look(t, 0);
+    for (std::size_t i = 0; i < body_.size(); ++i) {
+      const Capsule& c = body_[i];
+      bends_[i] = second_derivative_bound(lever_arms(arm_, c), c.link, dq_, c.radius_m);
+    }
+    reached_at({0, 0.25, 0.5, 0.75, 1});
     for (int i = 0; i < 4; ++i) split(0.125 + 0.25 * i, 0.125, 0);
     return bound_;
   }
@@ -114,17 +121,16 @@ double SegmentTiming::fraction_rate_at(double t_s) const {
   return a * std::min({t_s, ramp_s, duration_s - t_s}) / leading_angle_rad;
 }
 
-SegmentTiming time_segment(const ArmModel& arm, const Capsules& body, const JointVector& from, const JointVector& to,
+namespace {
+
+/// The fastest move when no point of the body goes faster than `reach_m` for each unit of the path parameter.
+SegmentTiming fastest_move(const ArmModel& arm, const JointVector& from, const JointVector& to, double reach_m,
                            const SpeedLimits& limits) {
-  ENSURE(4011, limits.body_speed_m_s > 0 && limits.joint_speed_rad_s > 0 && limits.joint_acceleration_rad_s2 > 0);
   SegmentTiming timing;
   timing.from = from;
   timing.to = to;
   const JointVector dq = to - from;
   const double angle = dq.max_abs();
-  if (angle == 0) return timing;
-
-  const double reach_m = speed_bound_m_per_unit(arm, body, from, to);
   double speed = limits.joint_speed_rad_s;
   if (reach_m > 0) speed = std::min(speed, limits.body_speed_m_s * angle / reach_m);
   for (int j = 0; j < arm.joints; ++j) {
@@ -138,6 +144,23 @@ SegmentTiming time_segment(const ArmModel& arm, const Capsules& body, const Join
   timing.duration_s = angle / peak + peak / acceleration;
   timing.body_speed_bound_m_s = reach_m * peak / angle;
   return timing;
+}
+
+}  // namespace
+
+SegmentTiming time_segment(const ArmModel& arm, const Capsules& body, const JointVector& from, const JointVector& to,
+                           const SpeedLimits& limits) {
+  ENSURE(4011, limits.body_speed_m_s > 0 && limits.joint_speed_rad_s > 0 && limits.joint_acceleration_rad_s2 > 0);
+  if (from == to) return {.from = from, .to = to};
+  return fastest_move(arm, from, to, speed_bound_m_per_unit(arm, body, from, to), limits);
+}
+
+double least_duration_s(const ArmModel& arm, const Capsules& body, const JointVector& from, const JointVector& to,
+                        const SpeedLimits& limits) {
+  ENSURE(4012, limits.body_speed_m_s > 0 && limits.joint_speed_rad_s > 0 && limits.joint_acceleration_rad_s2 > 0);
+  if (from == to) return 0;
+  const double reached_m = SpeedSearch(arm, body, from, to).reached_at({0, 0.5, 1});
+  return fastest_move(arm, from, to, reached_m, limits).duration_s;
 }
 
 }  // namespace firstlook

@@ -88,6 +88,7 @@ class GainScratch {
     epoch_of_[index] = is_new ? epoch_ : before;
     return is_new;
   }
+  [[nodiscard]] bool is_marked(std::size_t index) const { return epoch_of_[index] == epoch_; }
 
  private:
   std::vector<std::uint8_t> epoch_of_;

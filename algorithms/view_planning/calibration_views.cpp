@@ -92,10 +92,15 @@ double likelihood(const CalibrationViewInputs& in, std::uint32_t shown, const Tr
   return sum / std::popcount(shown);
 }
 
-double seconds(const Search& s, const JointVector& q) {
-  if (s.options.stop_s <= 0) return 1;
-  const SegmentTiming move = time_segment(s.inputs.arm, s.inputs.body.capsules, s.current, q, s.options.speed);
-  return move.duration_s + s.options.stop_s;
+/// What a view there is expected to lower the cost by, for each second of move and stop. Only what may be kept is timed
+/// in full.
+double worth(const Search& s, const JointVector& q, double drop) {
+  if (s.options.stop_s <= 0) return drop;
+  const CalibrationViewInputs& in = s.inputs;
+  const double least_s = least_duration_s(in.arm, in.body.capsules, s.current, q, s.options.speed);
+  const double at_most = drop / (least_s + s.options.stop_s);
+  if (s.best.full() && at_most <= s.best.back().worth) return at_most;
+  return drop / (time_segment(in.arm, in.body.capsules, s.current, q, s.options.speed).duration_s + s.options.stop_s);
 }
 
 /// Keeps q when it is new, sees a whole board that serves, is free and does not hide it: from cheap to dear.
@@ -119,7 +124,7 @@ void consider(Search& s, const JointVector& q) {
   ++s.feasible;
   const double likely = likelihood(in, shown & useful, frames.flange());
   const double cost = likely * cost_of(information, s.options) + (1 - likely) * s.cost_now;
-  keep_when_good(s, {q, shown, cost, (s.cost_now - cost) / seconds(s, q)});
+  keep_when_good(s, {q, shown, cost, worth(s, q, s.cost_now - cost)});
 }
 
 void draw_aimed(Search& s) {

@@ -70,6 +70,7 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
   const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
   candidates_.resize(room);
   order_.reserve(room);
+  best_.reserve(room);
   unreached_.reserve(room);
 }
 
@@ -79,7 +80,7 @@ std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, const Dept
   const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
   const std::size_t worker = geometry.count() + 2 * rays * sizeof(Eigen::Vector3d);
   return GainModel::required_bytes(geometry, sensor, sampling) + static_cast<std::size_t>(workers_max) * worker +
-         room * (sizeof(Candidate) + 2 * sizeof(int));
+         room * (sizeof(Candidate) + 3 * sizeof(int));
 }
 
 JointVector ViewChooser::draw_random(const Task& task, Random& random) const {
@@ -170,9 +171,8 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
 }
 
 /// A view that only makes room for motion pays when a later one looks into something unknown from there.
-void ViewChooser::note_progress(const ExploreOptions& options) {
-  const std::size_t unknown = gain_.unknown();
-  if (unknown + options.gain_min <= unknown_) {
+void ViewChooser::note_progress(std::size_t unknown, std::uint32_t gain_min) {
+  if (unknown + gain_min <= unknown_) {
     in_vain_ = 0;
   } else if (made_room_only_) {
     ++in_vain_;
@@ -187,10 +187,23 @@ bool ViewChooser::worthwhile(const Task& task, const Candidate& candidate) {
          (gain.unknown - gain.doubtful >= task.options.gain_min || gain.again - gain.doubtful_again >= task.again_min);
 }
 
-/// What a free candidate promises: its gain, and for one that is worth a view its utility.
-void ViewChooser::evaluate(const Task& task, Candidate& candidate, GainWorker& worker) const {
+/// What a free candidate promises at most: its gain, and for one that may be worth a view its utility.
+void ViewChooser::estimate(const Task& task, Candidate& candidate, GainWorker& worker) const {
   const ViewTiming& timing = task.options.timing;
-  candidate.gain = gain_.count(task.context, candidate.q, worker);
+  candidate.gain = gain_.count_at_most(task.context, candidate.q, worker);
+  candidate.exact = !worthwhile(task, candidate);
+  if (candidate.exact) return;
+  const double move_s =
+      least_duration_s(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits);
+  candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
+}
+
+void ViewChooser::make_exact(const Task& task, Candidate& candidate, GainWorker& worker) const {
+  if (candidate.exact) return;
+  const ViewTiming& timing = task.options.timing;
+  gain_.find_doubtful(task.context, candidate.q, worker, candidate.gain);
+  candidate.exact = true;
+  candidate.utility_per_s = 0;
   if (!worthwhile(task, candidate)) return;
   const double move_s =
       time_segment(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits).duration_s;
@@ -200,8 +213,11 @@ void ViewChooser::evaluate(const Task& task, Candidate& candidate, GainWorker& w
 void ViewChooser::score(const Task& task, RunParallel run_parallel) {
   const auto score_one = [&](int index, int worker) {
     Candidate& candidate = candidates_[static_cast<std::size_t>(index)];
+    GainWorker& own = workers_[static_cast<std::size_t>(worker)];
     find_candidate(task, index, candidate);
-    if (candidate.free) evaluate(task, candidate, workers_[static_cast<std::size_t>(worker)]);
+    if (!candidate.free) return;
+    estimate(task, candidate, own);
+    if (task.certificate) make_exact(task, candidate, own);  // it says how many there are
   };
   run_parallel(task.candidates(), score_one);
 }
@@ -211,7 +227,8 @@ void ViewChooser::score(const Task& task, RunParallel run_parallel) {
 void ViewChooser::refine(const Task& task, RunParallel run_parallel) {
   const ViewContext& c = task.context;
   const auto refine_one = [&](int index, int worker) {
-    Candidate& best = candidates_[static_cast<std::size_t>(order_[static_cast<std::size_t>(index)])];
+    Candidate& best = candidates_[static_cast<std::size_t>(best_[static_cast<std::size_t>(index)])];
+    GainWorker& own = workers_[static_cast<std::size_t>(worker)];
     Random random(task.options.seed, kRefineStream + (static_cast<std::uint64_t>(task.options.step) << 10) +
                                          static_cast<std::uint64_t>(index));
     for (int step = 0; step < task.options.refine_steps; ++step) {
@@ -225,24 +242,55 @@ void ViewChooser::refine(const Task& task, RunParallel run_parallel) {
         tried.q[j] = std::clamp(q_rad, c.arm.lower_rad[i] + kLimitMargin_rad, c.arm.upper_rad[i] - kLimitMargin_rad);
       }
       tried.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, tried.q, kRefinedMargin_m);
-      if (tried.free) evaluate(task, tried, workers_[static_cast<std::size_t>(worker)]);
+      if (tried.free) estimate(task, tried, own);
+      if (tried.utility_per_s > best.utility_per_s) make_exact(task, tried, own);
       best.tries = tried.tries;
-      if (tried.utility_per_s > best.utility_per_s) best = tried;
+      if (tried.exact && tried.utility_per_s > best.utility_per_s) best = tried;
     }
   };
-  run_parallel(std::min(task.options.refined, static_cast<int>(order_.size())), refine_one);
+  rank(task);
+  best_.clear();
+  while (static_cast<int>(best_.size()) < task.options.refined) {
+    const Candidate* best = next_best(task);
+    if (best == nullptr) break;
+    best_.push_back(static_cast<int>(best - candidates_.data()));
+  }
+  run_parallel(static_cast<int>(best_.size()), refine_one);
 }
 
+bool ViewChooser::is_worse(int a, int b) const {
+  const double ua = candidates_[static_cast<std::size_t>(a)].utility_per_s;
+  const double ub = candidates_[static_cast<std::size_t>(b)].utility_per_s;
+  return ua < ub || (ua == ub && a > b);
+}
+
+/// Makes the heap of all that may be worth a view.
 void ViewChooser::rank(const Task& task) {
   order_.clear();
   for (int i = 0; i < task.candidates(); ++i) {
-    if (worthwhile(task, candidates_[static_cast<std::size_t>(i)])) order_.push_back(i);
+    if (candidates_[static_cast<std::size_t>(i)].utility_per_s > 0) order_.push_back(i);
   }
-  std::sort(order_.begin(), order_.end(), [&](int a, int b) {
-    const double ua = candidates_[static_cast<std::size_t>(a)].utility_per_s;
-    const double ub = candidates_[static_cast<std::size_t>(b)].utility_per_s;
-    return ua > ub || (ua == ub && a < b);
-  });
+  std::ranges::make_heap(order_, [this](int a, int b) { return is_worse(a, b); });
+}
+
+/// Takes the best off the heap, exact; null when none is left. Most of the others need never be made so.
+const ViewChooser::Candidate* ViewChooser::next_best(const Task& task) {
+  const auto worse = [this](int a, int b) { return is_worse(a, b); };
+  while (!order_.empty()) {
+    std::ranges::pop_heap(order_, worse);
+    Candidate& candidate = candidates_[static_cast<std::size_t>(order_.back())];
+    if (candidate.exact) {
+      order_.pop_back();
+      return &candidate;
+    }
+    make_exact(task, candidate, workers_.front());
+    if (candidate.utility_per_s > 0) {
+      std::ranges::push_heap(order_, worse);
+    } else {
+      order_.pop_back();
+    }
+  }
+  return nullptr;
 }
 
 bool ViewChooser::beside_unreached(const Task& task, const JointVector& q_rad) const {
@@ -265,23 +313,26 @@ Status ViewChooser::plan_best(const Task& task, ViewChoice& choice) {
   const int plans_max = task.options.plans_max * (task.certificate ? 2 : 1);
   int plans = 0;
   unreached_.clear();
-  for (const int index : order_) {
-    const Candidate& candidate = candidates_[static_cast<std::size_t>(index)];
+  rank(task);
+  choice.certificate.unreached += task.certificate ? static_cast<int>(order_.size()) : 0;
+  while (plans < plans_max) {
+    const Candidate* candidate = next_best(task);
     // Utilities of straight moves bound what paths can give: from here on nothing is better.
-    if (plans >= plans_max || candidate.utility_per_s <= choice.utility_per_s) break;
-    if (beside_unreached(task, candidate.q)) continue;
+    if (candidate == nullptr || candidate->utility_per_s <= choice.utility_per_s) break;
+    ++choice.worthwhile;
+    if (beside_unreached(task, candidate->q)) continue;
     ++plans;
-    const Result<Path> path = planner_.plan_to(candidate.q);
+    const Result<Path> path = planner_.plan_to(candidate->q);
     if (!path) {
-      unreached_.push_back(index);
+      unreached_.push_back(static_cast<int>(candidate - candidates_.data()));
       continue;
     }
-    const double utility = candidate.gain.weight() / (path->duration_s + timing.settle_s + timing.look_s);
+    const double utility = candidate->gain.weight() / (path->duration_s + timing.settle_s + timing.look_s);
     if (utility <= choice.utility_per_s) continue;
     choice.outcome = ViewChoice::Outcome::kChosen;
-    choice.target = candidate.q;
+    choice.target = candidate->q;
     choice.path = *path;
-    choice.gain = candidate.gain;
+    choice.gain = candidate->gain;
     choice.utility_per_s = utility;
   }
   choice.planned += plans;
@@ -318,7 +369,26 @@ Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVe
                                        const ExploreOptions& options, RunParallel run_parallel) {
   ENSURE(4532, kSources * static_cast<std::size_t>(options.certificate_samples) <= candidates_.size());
   gain_.prepare(context);
-  note_progress(options);
+  if (!options.after_look) {
+    note_progress(gain_.unknown(), options.gain_min);
+    auto choice = search(context, current, options, run_parallel);
+    if (choice && choice->outcome == ViewChoice::Outcome::kChosen)
+      made_room_only_ = choice->gain.unknown < options.gain_min;
+    return choice;
+  }
+  if (!gain_.assume_look(context, current, workers_.front())) return ViewChoice{};
+  auto choice = search(context, current, options, run_parallel);
+  gain_.prepare(context);  // the look is judged by what it was chosen for
+  return choice;
+}
+
+void ViewChooser::adopt(const ViewGain& gain, std::size_t unknown, std::uint32_t gain_min) {
+  note_progress(unknown, gain_min);
+  made_room_only_ = gain.unknown < gain_min;
+}
+
+Result<ViewChoice> ViewChooser::search(const ViewContext& context, const JointVector& current,
+                                       const ExploreOptions& options, RunParallel run_parallel) {
   ViewChoice choice;
   Task task{.context = context,
             .current = current,
@@ -331,20 +401,13 @@ Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVe
     task.certificate = certificate;
     task.samples = certificate ? options.certificate_samples : candidates_max_;
     score(task, run_parallel);
-    rank(task);
     refine(task, run_parallel);
-    rank(task);
     for (int i = 0; i < task.candidates(); ++i) {
       choice.considered += candidates_[static_cast<std::size_t>(i)].tries;
       choice.free += candidates_[static_cast<std::size_t>(i)].free ? 1 : 0;
     }
-    choice.worthwhile += static_cast<int>(order_.size());
     if (Status planned = plan_best(task, choice); !planned) return std::unexpected(planned.error());
-    if (choice.outcome == ViewChoice::Outcome::kChosen) {
-      made_room_only_ = choice.gain.unknown < options.gain_min;
-      return choice;
-    }
-    choice.certificate.unreached += static_cast<int>(order_.size());
+    if (choice.outcome == ViewChoice::Outcome::kChosen) return choice;
   }
   certify_end(task, choice);
   return choice;

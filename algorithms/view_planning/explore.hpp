@@ -6,13 +6,14 @@
 #include "algorithms/mapping/remaining.hpp"
 #include "algorithms/motion/planner.hpp"
 #include "algorithms/view_planning/gain.hpp"
-#include "algorithms/view_planning/parallel.hpp"
+#include "platform/core/parallel.hpp"
 
 namespace firstlook {
 
 struct ExploreOptions {
   std::uint64_t seed = 1;
   std::uint32_t step = 0;                   ///< number of this choice: other candidates each time
+  bool after_look = false;                  ///< the look at `current` is still to come: the view after it is chosen
   int tries_per_candidate = 40;             ///< random configurations drawn for one that is free
   std::uint32_t gain_min = 8;               ///< unknown voxels that make a view worth it (k of the certificate)
   std::uint32_t again_min = 100;            ///< or voxels that it makes usable for motion
@@ -51,7 +52,7 @@ struct ViewChoice {
   double utility_per_s = 0;  ///< gain weight for each second of move, settling and looking
   int considered = 0;        ///< configurations looked at
   int free = 0;              ///< of them inside known free space with margin
-  int worthwhile = 0;        ///< of them with enough gain
+  int worthwhile = 0;        ///< of them with enough gain, as far as that was found out
   int planned = 0;           ///< handed to the planner
   TerminationCertificate certificate;
 };
@@ -70,9 +71,14 @@ class ViewChooser {
                                                   const GainSampling& sampling = {});
 
   /// The view with the highest gain for each second that a certified path leads to; the same arguments give the same
-  /// choice with any number of workers. Errors: kStartBlocked when `current` is not free.
+  /// choice with any number of workers. With `after_look` it says kNothingReachable where it cannot foresee the look,
+  /// and counts for nothing until adopt(). Errors: kStartBlocked when `current` is not free.
   [[nodiscard]] Result<ViewChoice> choose(const ViewContext& context, const JointVector& current,
                                           const ExploreOptions& options, RunParallel run_parallel);
+
+  /// The arm goes for a view that was chosen before the latest look.
+  /// @param unknown  voxels of the zone that are unknown now
+  void adopt(const ViewGain& gain, std::size_t unknown, std::uint32_t gain_min);
 
   /// Tells what a look brought: call it after each look (sweep too) was integrated into the map.
   void remember_look(const ViewContext& context, const JointVector& q_rad);
@@ -87,9 +93,10 @@ class ViewChooser {
   struct Candidate {
     JointVector q;
     ViewGain gain;
-    double utility_per_s = 0;  ///< for the straight move, which no path is expected to beat
+    double utility_per_s = 0;  ///< for the straight move, which no path is expected to beat; 0: not worth a view
     int tries = 0;
     bool free = false;
+    bool exact = false;  ///< else the utility is an upper bound, which costs a fraction
   };
   /// One choice while it is made.
   struct Task {
@@ -107,12 +114,17 @@ class ViewChooser {
   [[nodiscard]] JointVector draw_nearby(const Task& task, Random& random) const;
   [[nodiscard]] bool draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const;
   void find_candidate(const Task& task, int index, Candidate& out) const;
-  void evaluate(const Task& task, Candidate& candidate, GainWorker& worker) const;
+  void estimate(const Task& task, Candidate& candidate, GainWorker& worker) const;
+  void make_exact(const Task& task, Candidate& candidate, GainWorker& worker) const;
   void score(const Task& task, RunParallel run_parallel);
   void refine(const Task& task, RunParallel run_parallel);
-  void note_progress(const ExploreOptions& options);
+  void note_progress(std::size_t unknown, std::uint32_t gain_min);
+  [[nodiscard]] Result<ViewChoice> search(const ViewContext& context, const JointVector& current,
+                                          const ExploreOptions& options, RunParallel run_parallel);
   [[nodiscard]] static bool worthwhile(const Task& task, const Candidate& candidate);
+  [[nodiscard]] bool is_worse(int a, int b) const;
   void rank(const Task& task);
+  [[nodiscard]] const Candidate* next_best(const Task& task);
   [[nodiscard]] Status plan_best(const Task& task, ViewChoice& choice);
   [[nodiscard]] bool beside_unreached(const Task& task, const JointVector& q_rad) const;
   [[nodiscard]] bool can_move(const Task& task) const;
@@ -124,8 +136,9 @@ class ViewChooser {
   int in_vain_ = 0;              ///< such views in a row after which no more was known
   std::vector<GainWorker> workers_;
   std::vector<Candidate> candidates_;  ///< room for the certificate's samples
-  std::vector<int> order_;
-  std::vector<int> unreached_;  ///< candidates that the planner failed on
+  std::vector<int> order_;             ///< a heap: the best utility, or upper bound of one, is on top
+  std::vector<int> best_;              ///< those that are refined
+  std::vector<int> unreached_;         ///< candidates that the planner failed on
   int candidates_max_;
   Planner planner_;
   FixedVector<JointVector, 32> visited_;  ///< the latest looks

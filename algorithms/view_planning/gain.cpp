@@ -1,7 +1,6 @@
 #include "algorithms/view_planning/gain.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "algorithms/kinematics/self_collision.hpp"
@@ -29,8 +28,25 @@ bool needs_again(const ViewContext& context, std::size_t index) {
 /// A free voxel of which a surface fills so many octants that what lies behind is mostly the inside of things. One with
 /// fewer is an edge, of an opening too, and rays pass beside it.
 bool hides_what_is_behind(const VoxelMap& map, std::size_t index) {
-  constexpr int kOctantsMin = 3;
-  return std::popcount(map.octants(index).surface) >= kOctantsMin;
+  const unsigned surface = map.octants(index).surface;
+  const unsigned without_one = surface & (surface - 1);
+  return (without_one & (without_one - 1)) != 0;  // three or more
+}
+
+/// Where on a segment (0 at `from`, 1 at `to`, clamped) a box lies behind; negative when it does not meet the box.
+double leaves_box(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  double enters = 0, leaves = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double way = to[axis] - from[axis];
+    const double low = box.min()[axis] - from[axis], high = box.max()[axis] - from[axis];
+    if (way == 0) {
+      if (low > 0 || high < 0) return -1;
+      continue;
+    }
+    enters = std::max(enters, std::min(low / way, high / way));
+    leaves = std::min(leaves, std::max(low / way, high / way));
+  }
+  return enters <= leaves ? leaves : -1;
 }
 
 /// Whether a capsule in base coordinates can come between the sensor and any of its rays: it is not the sensor's own
@@ -101,7 +117,11 @@ void GainModel::prepare(const ViewContext& context) {
       case VoxelClass::kUnknown:
         plane[i] = futile ? kOpaque : counts ? kUnknownWeight : kUnknownNoWeight;
         unknown_ += counts ? 1 : 0;
-        if (counts && needs_backing(i)) backed_only_m_.extend(geometry_.center_m(geometry_.voxel_at(i)));
+        if (counts && needs_backing(i)) {
+          const Eigen::Vector3d center_m = geometry_.center_m(geometry_.voxel_at(i));
+          const Eigen::Vector3d half_m = Eigen::Vector3d::Constant(geometry_.resolution_m / 2);
+          backed_only_m_.extend(Eigen::AlignedBox3d(center_m - half_m, center_m + half_m));
+        }
         break;
       case VoxelClass::kFree:
         if (hides_what_is_behind(context.map, i)) {
@@ -172,24 +192,57 @@ const GainRays& GainModel::free_rays(const ViewContext& context, const LinkFrame
   return worker.rays;
 }
 
+ViewGain GainModel::count_along(const GainRays& rays, const Transform<Base, Depth>& base_T_depth,
+                                GainScratch& scratch) const {
+  const GainCount counted = count_unknown(plane_, rays, base_T_depth, sensor_.range_min_m, scratch);
+  const auto unknown = static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
+  return {.unknown = unknown, .again = counted.voxels - unknown};
+}
+
 ViewGain GainModel::count(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) const {
+  ViewGain gain = count_at_most(context, q_rad, worker);
+  find_doubtful(context, q_rad, worker, gain);
+  return gain;
+}
+
+bool GainModel::assume_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) {
   const LinkFrames frames = forward(context.arm, q_rad);
   const Transform<Base, Depth> base_T_depth = frames.flange() * context.flange_T_depth;
   const GainRays& rays = free_rays(context, frames, base_T_depth, worker);
-  const auto count_along = [&](const GainRays& along) {
-    const GainCount counted = count_unknown(plane_, along, base_T_depth, sensor_.range_min_m, worker.scratch);
-    const auto unknown =
-        static_cast<std::uint32_t>((counted.weight - counted.voxels) / (kUnknownWeight - kAgainWeight));
-    return ViewGain{.unknown = unknown, .again = counted.voxels - unknown};
-  };
-  ViewGain gain = count_along(rays);
-  if (far_.knows_openings() && gain.unknown + gain.again > 0) {
-    const GainRays& returning = returning_rays(base_T_depth, rays, worker);
-    const ViewGain sure = returning.ends_m.size() == rays.ends_m.size() ? gain : count_along(returning);
-    gain.doubtful = gain.unknown - std::min(gain.unknown, sure.unknown);
-    gain.doubtful_again = gain.again - std::min(gain.again, sure.again);
+  (void)count_along(rays, base_T_depth, worker.scratch);  // for its marks
+  if (count_backed(context, base_T_depth, rays, worker.scratch) > 0) return false;
+  const std::span<std::uint8_t> what = plane_.what();
+  for (std::size_t i = 0; i < what.size(); ++i) {
+    if (worker.scratch.is_marked(i)) what[i] = what[i] == kUnknownWeight ? kUnknownNoWeight : kPass;
   }
-  gain.unknown += count_backed(context, base_T_depth, rays, worker.scratch);
+  plane_.prepare(UnknownReading::kSeeThrough);
+  find_frontier(context);
+  if (context.prior != nullptr) prepare_prior(context);
+  return true;
+}
+
+void GainModel::find_doubtful(const ViewContext& context, const JointVector& q_rad, GainWorker& worker,
+                              ViewGain& gain) const {
+  gain.doubtful = gain.doubtful_again = 0;
+  const std::uint32_t unknown = gain.unknown - gain.backed;
+  if (!far_.knows_openings() || unknown + gain.again == 0) return;
+  const LinkFrames frames = forward(context.arm, q_rad);
+  const Transform<Base, Depth> base_T_depth = frames.flange() * context.flange_T_depth;
+  const GainRays& rays = free_rays(context, frames, base_T_depth, worker);
+  const GainRays& returning = returning_rays(base_T_depth, rays, worker);
+  if (returning.ends_m.size() == rays.ends_m.size()) return;
+  const ViewGain sure = count_along(returning, base_T_depth, worker.scratch);
+  gain.doubtful = unknown - std::min(unknown, sure.unknown);
+  gain.doubtful_again = gain.again - std::min(gain.again, sure.again);
+}
+
+ViewGain GainModel::count_at_most(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) const {
+  const LinkFrames frames = forward(context.arm, q_rad);
+  const Transform<Base, Depth> base_T_depth = frames.flange() * context.flange_T_depth;
+  const GainRays& rays = free_rays(context, frames, base_T_depth, worker);
+  ViewGain gain = count_along(rays, base_T_depth, worker.scratch);
+  gain.backed = count_backed(context, base_T_depth, rays, worker.scratch);
+  gain.unknown += gain.backed;
   if (context.prior != nullptr) {
     gain.expected_surface =
         count_unknown(*prior_plane_, rays, base_T_depth, sensor_.range_min_m, worker.scratch).voxels;
@@ -211,28 +264,33 @@ std::uint32_t GainModel::count_backed(const ViewContext& context, const Transfor
                                       const GainRays& rays, GainScratch& scratch) const {
   if (backed_only_m_.isEmpty()) return 0;
   const Eigen::Vector3d eye = base_T_depth.translation();
+  const std::span<const std::uint8_t> what = plane_.what();
+  const auto is_open = [what](std::size_t i) { return what[i] == kPass || what[i] == kAgainWeight; };
   std::uint32_t counted = 0;
+  Passed passed;
   for (std::size_t r = 0; r < rays.ends_m.size(); r += kTile) {  // that finds what is worth a look
-    for (const std::uint32_t i : pass_with_backing(context, eye, base_T_depth * rays.ends_m[r], rays.ends_m[r].z()))
-      counted += scratch.mark(i) ? 1U : 0U;
+    pass_with_backing(context, eye, base_T_depth * rays.ends_m[r], rays.ends_m[r].z(), is_open, passed);
+    for (const std::uint32_t i : passed) counted += scratch.mark(i) ? 1U : 0U;
   }
   return counted;
 }
 
-GainModel::Passed GainModel::pass_with_backing(const ViewContext& context, const Eigen::Vector3d& eye,
-                                               const Eigen::Vector3d& end, double depth_m) const {
-  Passed passed;
-  if (!Eigen::AlignedBox3d(eye.cwiseMin(end), eye.cwiseMax(end)).intersects(backed_only_m_)) return passed;
-  walk_ray(geometry_, eye, end, [&](std::size_t i, double entry) {
+template <typename IsOpen>
+void GainModel::pass_with_backing(const ViewContext& context, const Eigen::Vector3d& eye, const Eigen::Vector3d& end,
+                                  double depth_m, IsOpen is_open, Passed& passed) const {
+  passed.clear();
+  const double last = backed_only_m_.isEmpty() ? -1 : leaves_box(backed_only_m_, eye, end);
+  if (last < 0) return;
+  walk_ray(geometry_, eye, eye + last * (end - eye), [&](std::size_t i, double entry) {
+    if (is_open(i)) return true;
     const VoxelClass voxel = context.map.voxel_class(i);
     if (voxel == VoxelClass::kOccupied || hides_what_is_behind(context.map, i)) return false;
-    if (voxel == VoxelClass::kFree || entry * depth_m < sensor_.range_min_m) return true;
+    if (voxel == VoxelClass::kFree || entry * last * depth_m < sensor_.range_min_m) return true;
     if (futile_.backed(i) >= sampling_.futile_max) return false;
     if (context.zone[i] != 0 && needs_backing(i) && !passed.full()) passed.push_back(static_cast<std::uint32_t>(i));
     return true;
   });
   if (!passed.empty() && !is_backed(context.map, eye, (end - eye).normalized())) passed.clear();
-  return passed;
 }
 
 const GainRays& GainModel::returning_rays(const Transform<Base, Depth>& base_T_depth, const GainRays& rays,
@@ -275,8 +333,11 @@ std::size_t GainModel::remember_look(const ViewContext& context, const JointVect
   // What only rays with a surface behind still count, all along such a ray: it should have told of each.
   worker.scratch.begin();
   const Eigen::Vector3d eye = base_T_depth.translation();
+  const auto never = [](std::size_t) { return false; };  // the plane is of before the look
+  Passed passed;
   for (const Eigen::Vector3d& end : rays.ends_m) {
-    for (const std::uint32_t i : pass_with_backing(context, eye, base_T_depth * end, end.z())) {
+    pass_with_backing(context, eye, base_T_depth * end, end.z(), never, passed);
+    for (const std::uint32_t i : passed) {
       if (worker.scratch.mark(i)) futile_.add(i, true);
     }
   }

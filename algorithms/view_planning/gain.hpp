@@ -79,9 +79,17 @@ class GainModel {
   /// were futile, too: a look into the open sky tells nothing, one past the same place towards a wall does.
   void prepare(const ViewContext& context);
 
+  /// On the prepared map: what a look at q would tell counts no more, as if it had been taken. Holds until the next
+  /// prepare(). False, and nothing has changed, where more than that would change: rays with a surface behind them tell
+  /// something there.
+  [[nodiscard]] bool assume_look(const ViewContext& context, const JointVector& q_rad, GainWorker& worker);
+
   /// What a look at configuration q would tell on the prepared map. Rays end at the trusted range; nearer than the
   /// sensor's minimum nothing counts; rays that meet the body are left out.
   [[nodiscard]] ViewGain count(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) const;
+  /// The same in two steps: as if nothing of it were doubtful, which weighs no less, and then what of it is.
+  [[nodiscard]] ViewGain count_at_most(const ViewContext& context, const JointVector& q_rad, GainWorker& worker) const;
+  void find_doubtful(const ViewContext& context, const JointVector& q_rad, GainWorker& worker, ViewGain& gain) const;
 
   /// After a look at q was integrated into the map: voxels that its rays meet first and that are still unknown, or free
   /// but still not usable for motion, had a futile look. Call it once for each look; returns how many there were.
@@ -113,11 +121,15 @@ class GainModel {
   /// The rays that no capsule of the body blocks; lives in the worker when some are.
   const GainRays& free_rays(const ViewContext& context, const LinkFrames& frames,
                             const Transform<Base, Depth>& base_T_depth, GainWorker& worker) const;
+  /// Counts on the plane.
+  [[nodiscard]] ViewGain count_along(const GainRays& rays, const Transform<Base, Depth>& base_T_depth,
+                                     GainScratch& scratch) const;
   using Passed = FixedVector<std::uint32_t, 128>;
-  /// The unknown voxels that needs_backing() on a ray to `end` (base; `depth_m` along the optical axis), in order; none
-  /// when it has no backing.
-  [[nodiscard]] Passed pass_with_backing(const ViewContext& context, const Eigen::Vector3d& eye,
-                                         const Eigen::Vector3d& end, double depth_m) const;
+  /// The unknown voxels that needs_backing() on a ray to `end` (base; `depth_m` along the optical axis), in order, into
+  /// `passed`; none when it has no backing. `is_open(index)` may say at once that a voxel is free and hides nothing.
+  template <typename IsOpen>
+  void pass_with_backing(const ViewContext& context, const Eigen::Vector3d& eye, const Eigen::Vector3d& end,
+                         double depth_m, IsOpen is_open, Passed& passed) const;
   /// Unknown voxels that needs_backing() and rays with backing see, beyond those counted on the plane.
   [[nodiscard]] std::uint32_t count_backed(const ViewContext& context, const Transform<Base, Depth>& base_T_depth,
                                            const GainRays& rays, GainScratch& scratch) const;

@@ -39,6 +39,7 @@ struct ViewTiming {
 /// What a look from one place is expected to tell.
 struct ViewGain {
   std::uint32_t unknown = 0;           ///< unknown voxels of the zone, each once: what coverage counts
+  std::uint32_t backed = 0;            ///< of `unknown`: that only rays with a surface behind count
   std::uint32_t again = 0;             ///< free, but motion cannot use them, or not for long (safety rule 1)
   std::uint32_t expected_surface = 0;  ///< of `unknown`: where an earlier map has a surface
   /// Of `unknown` and of `again`: on rays alone that end, by what has been seen, where nothing returns.

@@ -148,8 +148,8 @@ DetectResult Workbench::detect_board(const DetectArguments& arguments) {
   result.still = sight.still;
   result.moved_px = sight.moved_px;
   const bool first_sight = std::ranges::none_of(identify_reference_, [](const auto& pose) { return pose.has_value(); });
-  const bool observes = (arguments.purpose == BoardLook::kCollect || arguments.purpose == BoardLook::kVerify) &&
-                        stops() < static_cast<std::size_t>(config_.calibration.views_max);
+  const bool observes =
+      (arguments.purpose == BoardLook::kCollect || arguments.purpose == BoardLook::kVerify) && stops() < stops_max();
   const std::size_t stop = stops();
   const PosedFrame& last = arguments.frames.back();
   for (const BoardSight::Target& seen : sight.targets) {

@@ -54,7 +54,7 @@ HandEyeOptions Workbench::solve_options() const {
   options.refinement.arm_sigma_expected = arm_sigma_expected();
   if (estimates_intrinsics()) options.refinement.intrinsics = EstimatedIntrinsics::kWithoutK3;
   VerdictLimits& limits = options.limits;
-  limits.gated_at_end_max = 0;  // nobody watches, and a detection that is wrong by itself is rare
+  limits.gated_last_max = 0;  // nobody watches; where it is the only one, the machine takes more views
   limits.views_min = std::min(config_.calibration.views_min, 6);
   limits.sigma_translation_max_m = config_.calibration.sigma_max_mm * 1e-3;
   limits.sigma_rotation_max_rad = config_.calibration.sigma_max_mrad * 1e-3;
@@ -208,22 +208,70 @@ CalibrationViewResult Workbench::next_bootstrap_view(const FromHere& here) {
   return result;
 }
 
-CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
-  publish_blind(here.now_s, MotionPhase::kBeforeCalibration);
-  const auto rough = rough_model();
-  if (!rough) return next_bootstrap_view(here);
-  const std::vector<std::size_t> counted = independent_observations();
+/// Where the board was seen from by the views that count.
+std::vector<JointVector> Workbench::places_of(std::span<const std::size_t> counted) const {
   std::vector<JointVector> taken;
   for (std::size_t k = 0; k < counted.size(); ++k) {
     const Observation& o = observations_[counted[k]];
     const bool same = k > 0 && observations_[counted[k - 1]].view.station == o.view.station;
     if (!same) taken.push_back(o.joints_rad);
   }
+  return taken;
+}
+
+CalibrationViewOptions Workbench::calibration_view_options(const FromHere& here) const {
   CalibrationViewOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.step = here.step;
   options.speed = limits_;
   options.stop_s = kViewStop_s;
+  return options;
+}
+
+/// How sure the views make the transform, and whether that is enough.
+void Workbench::note_sigma(const RoughModel& rough, const Eigen::MatrixXd& information,
+                           CalibrationViewResult& result) const {
+  const PredictedSigma sigma = predicted_sigma(rough.covariance.value_or(predicted_hand_eye(information)));
+  result.sigma_mm = 1000 * sigma.translation_m;
+  result.sigma_mrad = 1000 * sigma.rotation_rad;
+  const bool can_tell = rough.covariance.has_value() || !estimates_intrinsics();
+  result.target_met = can_tell && result.sigma_mm <= config_.calibration.target_sigma_mm &&
+                      result.sigma_mrad <= config_.calibration.target_sigma_mrad;
+}
+
+/// The view after the one that the arm is under way to, if that one shows what is expected: found where there is one
+/// board, whose views are chosen, and enough of them to believe the model; or the target met.
+CalibrationViewResult Workbench::calibration_view_after_look(const FromHere& here) {
+  CalibrationViewResult result;
+  if (boards_.size() > 1 || config_.calibration.views == "fixed48" || stops() < kIndependentMin) return result;
+  const auto rough = rough_model();
+  if (!rough || rough->models.size() != 1) return result;
+  const std::vector<std::size_t> counted = independent_observations();
+  std::vector<JointVector> taken = places_of(counted);
+  taken.push_back(here.at_rad);
+  const auto base_T_flange = forward(arm_, here.at_rad).flange();
+  const Eigen::MatrixXd information =
+      information_of(*rough, counted) + joint_view_information(rough->models, 1, base_T_flange);
+  note_sigma(*rough, information, result);
+  const std::vector<BoardLookOutcome> looks = look_outcomes(*rough);
+  const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
+  const Clearance clearance = blind_terms_.clearance();
+  const CalibrationViewInputs inputs{arm_, envelope_body_, space, clearance, rough->models, information, taken, looks};
+  const auto choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, calibration_view_options(here));
+  if (!choice || choice->outcome != CalibrationViewChoice::Outcome::kChosen) return result;
+  result.found = true;
+  result.path = route_of(choice->path, envelope_body_, limits_);
+  return result;
+}
+
+CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
+  publish_blind(here.now_s, MotionPhase::kBeforeCalibration);
+  if (here.after_look) return calibration_view_after_look(here);
+  const auto rough = rough_model();
+  if (!rough) return next_bootstrap_view(here);
+  const std::vector<std::size_t> counted = independent_observations();
+  const std::vector<JointVector> taken = places_of(counted);
+  CalibrationViewOptions options = calibration_view_options(here);
   const bool fixed = config_.calibration.views == "fixed48";
   options.wanted = fixed ? 0 : wanted_targets(*rough, counted);
   const FreeSpace space = space_of(MotionPhase::kBeforeCalibration);
@@ -232,10 +280,7 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
   const CalibrationViewInputs inputs{
       arm_, envelope_body_, space, clearance, rough->models, information_of(*rough, counted), taken, looks};
   CalibrationViewResult result;
-  const PredictedSigma sigma = predicted_sigma(rough->covariance.value_or(predicted_hand_eye(inputs.information)));
-  result.sigma_mm = 1000 * sigma.translation_m;
-  result.sigma_mrad = 1000 * sigma.rotation_rad;
-  const bool can_tell = rough->covariance.has_value() || !estimates_intrinsics();
+  note_sigma(*rough, inputs.information, result);
   auto choice = fixed ? next_fixed_view(inputs, planner_, here.at_rad, fixed_next_, options)
                       : firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
   const auto found = [&] { return choice && choice->outcome == CalibrationViewChoice::Outcome::kChosen; };
@@ -252,9 +297,7 @@ CalibrationViewResult Workbench::next_calibration_view(const FromHere& here) {
       choice = firstlook::next_calibration_view(inputs, planner_, here.at_rad, options);
     }
   }
-  result.target_met = can_tell && !fixed && options.wanted == 0 &&
-                      result.sigma_mm <= config_.calibration.target_sigma_mm &&
-                      result.sigma_mrad <= config_.calibration.target_sigma_mrad;
+  result.target_met = result.target_met && !fixed && options.wanted == 0;
   const bool too_few = stops() < static_cast<std::size_t>(config_.calibration.views_min);
   if (!found() && too_few) {
     options.different_min_rad = kCrowded_rad;  // few places see the board: views side by side are better than none
@@ -304,8 +347,10 @@ SolveResult Workbench::solve() {
 ValidateResult Workbench::validate() {
   ValidateResult result;
   if (!hand_eye_) return result;
-  validate_hand_eye(color_.intrinsics(), boards_, views(), solve_options(), *hand_eye_);
+  validate_hand_eye(color_.intrinsics(), boards_, views(), solve_options(), *hand_eye_,
+                    [this](int n, IndexedBody body) { spread_over_workers(n, body); });
   result.accepted = hand_eye_->verdict == Verdict::kAccepted;
+  result.more_views_tell = hand_eye_->only_last_contradicts;
   result.holdout_rms_px = hand_eye_->holdout_rms_px;
   result.usable_distance_m = hand_eye_->usable_distance_m;
   if (result.accepted && tests_by_touch()) {

@@ -1,8 +1,10 @@
 #include "app/jobs/cart_jobs.hpp"
 
+#include <algorithm>
 #include <new>
 
 #include "platform/journal/archive.hpp"
+#include "platform/linux/wakeup.hpp"
 #include "platform/memory/allocation_guard.hpp"
 
 namespace firstlook {
@@ -41,6 +43,17 @@ void CartJobs::tell_if_accepted() const {
 }
 
 std::size_t CartJobs::execute(const JobRequest& request, std::span<std::byte> result) noexcept {
+  const std::int64_t began_ns = monotonic_ns();
+  const std::size_t size = dispatch(request, result);
+  const double took_s = 1e-9 * static_cast<double>(monotonic_ns() - began_ns);
+  JobTimes& times = times_.at(request.kind - 1U);
+  ++times.count;
+  times.total_s += took_s;
+  times.longest_s = std::max(times.longest_s, took_s);
+  return size;
+}
+
+std::size_t CartJobs::dispatch(const JobRequest& request, std::span<std::byte> result) noexcept {
   Workbench& b = bench_;
   switch (static_cast<JobKind>(request.kind)) {
     case JobKind::kLocateViews:
@@ -112,10 +125,10 @@ Duration virtual_duration(JobKind kind) {
     case JobKind::kDetectBoard:
     case JobKind::kCheckBoard:
     case JobKind::kSeeOnTheWay:
-      return milliseconds(150);
+      return milliseconds(90);
     case JobKind::kNextCalibrationView:
     case JobKind::kNextVerificationView:
-      return milliseconds(500);
+      return milliseconds(200);
     case JobKind::kSolve:
       return milliseconds(300);
     case JobKind::kValidate:
@@ -126,12 +139,12 @@ Duration virtual_duration(JobKind kind) {
     case JobKind::kIntegrate:
     case JobKind::kForgetKnownFree:
     case JobKind::kColorLook:
-      return milliseconds(80);
+      return milliseconds(40);
     case JobKind::kNextSweepView:
     case JobKind::kNextView:
       return milliseconds(200);
     case JobKind::kSummarize:
-      return milliseconds(500);
+      return milliseconds(100);
   }
   return milliseconds(100);
 }

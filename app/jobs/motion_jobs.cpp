@@ -16,10 +16,14 @@ Route Workbench::route_of(const Path& path, const Body& body, const SpeedLimits&
 }
 
 bool Workbench::route_is_certified(const JointVector& from, const Route& route, double* margin_m) const {
+  return route_is_certified(camera_body_, mapping_space_, clearance_in_force_, from, route, margin_m);
+}
+
+bool Workbench::route_is_certified(const Body& body, const FreeSpace& space, const Clearance& clearance,
+                                   const JointVector& from, const Route& route, double* margin_m) const {
   JointVector at = from;
   for (const Leg& leg : route) {
-    const Certificate certificate =
-        certify(arm_, camera_body_, mapping_space_, clearance_in_force_, at, leg.target_rad);
+    const Certificate certificate = certify(arm_, body, space, clearance, at, leg.target_rad);
     if (!certificate.certified()) return false;
     if (margin_m != nullptr) *margin_m = std::min(*margin_m, certificate.margin_m);
     at = leg.target_rad;
@@ -65,10 +69,22 @@ PlanResult Workbench::plan(const PlanArguments& arguments) {
 
 PlanResult Workbench::certify_path(const PlanArguments& arguments) {
   PlanResult result;
-  rebuild_free_space(arguments.now_s);
   result.margin_m = 1;
-  result.found = route_is_certified(arguments.from_rad, arguments.path, &result.margin_m);
   result.path = arguments.path;
+  if (arguments.phase != MotionPhase::kMapping) {
+    publish_blind(arguments.now_s, arguments.phase);
+    result.found = route_is_certified(body_of(arguments.phase), space_of(arguments.phase), blind_terms_.clearance(),
+                                      arguments.from_rad, arguments.path, &result.margin_m);
+    return result;
+  }
+  rebuild_free_space(arguments.now_s);
+  if (arguments.foreseen && foreseen_) clearance_in_force_ = foreseen_->pace.in_force;
+  result.found = route_is_certified(arguments.from_rad, arguments.path, &result.margin_m);
+  if (arguments.foreseen && foreseen_ && result.found) {
+    take_choice(foreseen_->path, foreseen_->gain.unknown, foreseen_->pace);
+    chooser_.adopt(foreseen_->gain, unknown_before_, gain_min());
+  }
+  foreseen_.reset();
   return result;
 }
 
@@ -85,13 +101,18 @@ void Workbench::note_trail(const Path& path) {
   for (const JointVector& q : path.waypoints) trail_.push_back(q);
 }
 
-void Workbench::take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace) {
-  result.found = true;
-  result.path = route_of(path, camera_body_, pace.limits);
+void Workbench::take_choice(const Path& path, double gain, const Pace& pace) {
   note_trail(path);
-  result.gain_expected = gain;
   expected_gain_ = gain;
   clearance_in_force_ = pace.in_force;
+}
+
+NextViewResult Workbench::found_view(const Path& path, double gain, const Pace& pace) const {
+  NextViewResult result;
+  result.found = true;
+  result.path = route_of(path, camera_body_, pace.limits);
+  result.gain_expected = gain;
+  return result;
 }
 
 NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
@@ -112,7 +133,8 @@ NextViewResult Workbench::sweep_at(const Pace& pace, const FromHere& here) {
     result.fault = step.error().fault;
     note_blocked(step.error());
   } else if (!step->done && !exploring_is_faster(view_context, *step, pace, here)) {
-    take_choice(result, step->path, step->gain.unknown, pace);
+    result = found_view(step->path, step->gain.unknown, pace);
+    take_choice(step->path, step->gain.unknown, pace);
   }
   return result;
 }
@@ -157,13 +179,13 @@ Result<ViewChoice> Workbench::choose_view(const ViewContext& view_context, const
   ExploreOptions options;
   options.seed = static_cast<std::uint64_t>(config_.seed);
   options.step = here.step;
-  options.gain_min = static_cast<std::uint32_t>(config_.explore.cluster_voxels_min);
+  options.after_look = here.after_look;
+  options.gain_min = gain_min();
   options.certificate_samples = config_.explore.certificate_samples;
   options.timing = view_timing(pace);
   options.trail = trail_;
-  return chooser_.choose(view_context, here.at_rad, options, [this](int n, IndexedBody body) {
-    workers_.parallel_for(n, [&body](int index, int worker) { body(index, worker); });
-  });
+  return chooser_.choose(view_context, here.at_rad, options,
+                         [this](int n, IndexedBody body) { spread_over_workers(n, body); });
 }
 
 NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
@@ -172,19 +194,27 @@ NextViewResult Workbench::explore_at(const Pace& pace, const FromHere& here) {
   if (!choice) {
     result.blocked = choice.error().fault == Fault::kStartBlocked;
     result.fault = choice.error().fault;
-    note_blocked(choice.error());
+    if (!here.after_look) note_blocked(choice.error());
     return result;
+  }
+  if (choice->outcome == ViewChoice::Outcome::kChosen) {
+    result = found_view(choice->path, choice->gain.unknown, pace);
+    if (here.after_look) {
+      foreseen_ = ForeseenView{choice->path, choice->gain, pace};
+    } else {
+      take_choice(choice->path, choice->gain.unknown, pace);
+    }
   }
   result.candidates = static_cast<std::uint32_t>(choice->free);
   result.blocked = choice->outcome == ViewChoice::Outcome::kNothingReachable;
-  if (choice->outcome == ViewChoice::Outcome::kChosen) take_choice(result, choice->path, choice->gain.unknown, pace);
   return result;
 }
 
 NextViewResult Workbench::next_view(const FromHere& here) {
   rebuild_free_space(here.now_s);
   sweeping_ = false;
-  expected_gain_ = 0;
+  foreseen_.reset();
+  if (!here.after_look) expected_gain_ = 0;
   NextViewResult result;
   const auto paces = mapping_paces();
   for (std::size_t i = 0; i < paces.size(); ++i) {

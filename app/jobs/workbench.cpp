@@ -163,7 +163,7 @@ Workbench::Workbench(const Config& config, const CellFacts& facts, const ArmMode
   identify_reference_.resize(boards_.size());
   located_.resize(boards_.size());
   sought_.resize(boards_.size());
-  observations_.reserve((static_cast<std::size_t>(config.calibration.views_max) + 1) * boards_.size());
+  observations_.reserve((stops_max() + 1) * boards_.size());
   way_sights_.reserve(kWaySightsMax);
   begin_alignment();
   searches_inner_links_ = configuration_is_free(arm_, searching_body_, space_of(MotionPhase::kLinkUnknown),
@@ -209,7 +209,7 @@ Status Workbench::take_memory() {
                               (planes_.color ? ColorRegistration::required_bytes(sensor, color_.intrinsics()) : 0) +
                               (fine_map_ ? Inserter::required_bytes(fine_map_->geometry(), sensor) : 0);
   const std::size_t snapshot = 2 * DistanceField::required_bytes(g) + g.count();
-  const auto views = static_cast<std::size_t>(config_.calibration.views_max) + 1;
+  const std::size_t views = stops_max() + 1;
   // A stop may show every target, a frame on the way counts for one of them.
   std::size_t view = 0, points_max = 0;
   for (const BoardSpec& board : boards_) {
@@ -256,9 +256,8 @@ Status Workbench::take_memory() {
   self_depth_ = std::move(*self);
   // Pictures of the first views that fit; the report shows the corners of the others without.
   const std::size_t pictures_fit = memory::budget_row(memory::Pool::kReportBuffers).bytes() / color_pixels;
-  auto pictures = memory::PoolBuffer<std::uint8_t>::make(
-      memory::Pool::kReportBuffers,
-      color_pixels * std::min(pictures_fit, static_cast<std::size_t>(config_.calibration.views_max)));
+  auto pictures = memory::PoolBuffer<std::uint8_t>::make(memory::Pool::kReportBuffers,
+                                                         color_pixels * std::min(pictures_fit, stops_max()));
   if (!pictures) return std::unexpected(pictures.error());
   pictures_ = std::move(*pictures);
   return {};

@@ -194,6 +194,15 @@ class Workbench {
   void note_blocked(const Error& error);
   [[nodiscard]] Route route_of(const Path& path, const Body& body, const SpeedLimits& limits) const;
   [[nodiscard]] bool route_is_certified(const JointVector& from, const Route& route, double* margin_m = nullptr) const;
+  [[nodiscard]] bool route_is_certified(const Body& body, const FreeSpace& space, const Clearance& clearance,
+                                        const JointVector& from, const Route& route, double* margin_m) const;
+  void spread_over_workers(int n, IndexedBody body) const {
+    workers_.parallel_for(n, [&body](int index, int worker) { body(index, worker); });
+  }
+  /// Unknown voxels that make a view worth it.
+  [[nodiscard]] std::uint32_t gain_min() const {
+    return static_cast<std::uint32_t>(config_.explore.cluster_voxels_min);
+  }
   [[nodiscard]] ViewContext context(const Clearance& clearance) const;
   [[nodiscard]] NextViewResult sweep_at(const Pace& pace, const FromHere& here);
   [[nodiscard]] bool exploring_is_faster(const ViewContext& view_context, const SweepStep& step, const Pace& pace,
@@ -229,8 +238,11 @@ class Workbench {
                const BoardSight::Target& seen, const BoardPose& pose);
   void settle_observations(BoardLook purpose);
   void note_collect_look(const JointVector& at_rad, TargetMask seen);
-  /// How many stops showed a target.
+  /// How many stops showed a target, and how many may: with those that Validate asks for.
   [[nodiscard]] std::size_t stops() const;
+  [[nodiscard]] std::size_t stops_max() const {
+    return static_cast<std::size_t>(config_.calibration.views_max + kSecondLooks);
+  }
   [[nodiscard]] const BoardSpec& board(int target) const { return boards_[static_cast<std::size_t>(target)]; }
   [[nodiscard]] TargetMask solved_targets() const;
   struct BoardShift {
@@ -256,6 +268,10 @@ class Workbench {
   [[nodiscard]] std::optional<RoughModel> rough_model() const;
   [[nodiscard]] bool estimates_intrinsics() const { return config_.calibration.intrinsics == "estimate"; }
   [[nodiscard]] CalibrationViewResult next_bootstrap_view(const FromHere& here);
+  [[nodiscard]] CalibrationViewResult calibration_view_after_look(const FromHere& here);
+  [[nodiscard]] std::vector<JointVector> places_of(std::span<const std::size_t> counted) const;
+  void note_sigma(const RoughModel& rough, const Eigen::MatrixXd& information, CalibrationViewResult& result) const;
+  [[nodiscard]] CalibrationViewOptions calibration_view_options(const FromHere& here) const;
   [[nodiscard]] ArmSigma arm_sigma_expected() const;
   [[nodiscard]] HandEyeOptions solve_options() const;
   [[nodiscard]] std::vector<std::size_t> independent_observations() const;
@@ -280,7 +296,8 @@ class Workbench {
     return facts_.stored ? MotionPhase::kBeforeCalibration : MotionPhase::kLinkUnknown;
   }
   void note_frame(const IntegrateArguments& arguments, const VoxelCounts& counts);
-  void take_choice(NextViewResult& result, const Path& path, double gain, const Pace& pace);
+  [[nodiscard]] NextViewResult found_view(const Path& path, double gain, const Pace& pace) const;
+  void take_choice(const Path& path, double gain, const Pace& pace);
 
   Config config_;
   CellFacts facts_;
@@ -368,6 +385,13 @@ class Workbench {
   std::optional<std::pair<std::uint32_t, std::uint64_t>> last_picture_;  ///< of depth: frame and hash of its pixels
   double last_stamp_s_ = 0;
   bool sweeping_ = true;
+  /// The view that was chosen for after a look that is still to come.
+  struct ForeseenView {
+    Path path;
+    ViewGain gain;
+    Pace pace;
+  };
+  std::optional<ForeseenView> foreseen_;
   double expected_gain_ = 0;
   Error blocked_;  ///< the latest kStartBlocked
   std::uint64_t frames_integrated_ = 0;

@@ -98,9 +98,11 @@ struct FromHere {
   std::uint32_t step = 0;  ///< counts the calls of this kind; seeds the candidates. kLocateViews: 1 for the views of a
                            ///< camera on an inner link
   double now_s = 0;
+  /// kNextView, kNextCalibrationView: the arm is under way to `at_rad`, and this is for after the look there.
+  bool after_look = false;
   template <typename Archive>
   void fields(Archive& a) {
-    a(at_rad, step, now_s);
+    a(at_rad, step, now_s, after_look);
   }
 };
 
@@ -119,10 +121,11 @@ struct PlanArguments {  ///< kPlan, kCertifyPath (the path as it was chosen)
   MotionPhase phase = MotionPhase::kBeforeCalibration;
   std::uint32_t step = 0;
   double now_s = 0;
-  Route path;  ///< only for kCertifyPath
+  Route path;             ///< only for kCertifyPath
+  bool foreseen = false;  ///< kCertifyPath: it leads to the view that was chosen for after the look
   template <typename Archive>
   void fields(Archive& a) {
-    a(from_rad, to_rad, phase, step, now_s, path);
+    a(from_rad, to_rad, phase, step, now_s, path, foreseen);
   }
 };
 
@@ -264,14 +267,18 @@ struct SolveResult {
   }
 };
 
+/// Views that are taken when one at the end contradicts the others, to tell a wrong view from a board that has moved.
+inline constexpr std::int32_t kSecondLooks = 2;
+
 struct ValidateResult {
   bool accepted = false;
+  bool more_views_tell = false;  ///< rejected for its last view alone: wrong by itself, or something has moved
   double holdout_rms_px = 0;
   double usable_distance_m = 0;
   double clearance_m = 0;  ///< of safety rule 5, with this calibration
   template <typename Archive>
   void fields(Archive& a) {
-    a(accepted, holdout_rms_px, usable_distance_m, clearance_m);
+    a(accepted, more_views_tell, holdout_rms_px, usable_distance_m, clearance_m);
   }
 };
 

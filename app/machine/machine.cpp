@@ -59,6 +59,11 @@ void Machine::on_event(Instant now, const MachineEvent& event) {
     way_job_ = 0;
     return;
   }
+  if (const auto* done = std::get_if<JobCompleted>(&event);
+      done != nullptr && foreseeing_job_ != 0 && done->number == foreseeing_job_) {
+    remember_foreseen(*done);
+    return;
+  }
   note_way_frame(event);
   if (supervise(event)) return;
   dispatch(event);
@@ -281,9 +286,34 @@ void Machine::see_way_frames() {
   awaited_ = awaited;
 }
 
+// ---- what is chosen while the arm is under way
+
+void Machine::foresee(JobKind kind) {
+  if (path_.empty()) return;
+  const std::uint32_t awaited = awaited_;
+  foreseeing_job_ = start_job(kind, FromHere{path_.back().target_rad, progress_.steps++, now_.seconds(), true});
+  awaited_ = awaited;
+}
+
+/// A job that failed has foreseen nothing: the choice is made when it is due, and fails then if it must.
+void Machine::remember_foreseen(const JobCompleted& done) {
+  foreseeing_job_ = 0;
+  if (done.failed) return;
+  if (done.kind == JobKind::kNextView) ENSURE(7004, unpack(done.result, foreseen_view_.emplace()));
+  if (done.kind == JobKind::kNextCalibrationView)
+    ENSURE(7005, unpack(done.result, foreseen_calibration_view_.emplace()));
+}
+
+void Machine::forget_foreseen() {
+  foreseeing_job_ = 0;
+  foreseen_view_.reset();
+  foreseen_calibration_view_.reset();
+}
+
 // ---- trips
 
 void Machine::start_trip(const Route& path, OnTheWay on_the_way) {
+  forget_foreseen();
   path_ = path;
   leg_ = 0;
   travelling_ = true;
@@ -305,6 +335,7 @@ void Machine::send_leg() {
 
 void Machine::withdraw_trip() {
   if (!travelling_) return;
+  forget_foreseen();
   travelling_ = false;
   cancel_timer(MachineTimer::kSupervise);
   sink_.stop_arm(now_);

@@ -5,6 +5,7 @@
 #include <bitset>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "app/machine/decisions.hpp"
 #include "app/machine/events.hpp"
@@ -48,19 +49,21 @@ struct TargetView {
 
 /// What the machine remembers of the job, apart from the state itself.
 struct Progress {
-  ViewList views;                  ///< of LocateBoard, later of IdentifyLink
-  std::uint32_t view = 0;          ///< position in `views`, in VerifyBoard in `target_views`
-  std::uint32_t searches = 0;      ///< for the board that found none: all views of one list were in vain
-  bool camera_on_flange = false;   ///< identified
-  std::uint32_t observations = 0;  ///< views of the board taken for the calibration
-  std::uint32_t failed_looks = 0;  ///< in a row, at calibration views
-  std::uint32_t still_images = 0;  ///< joints that moved without moving the image
-  int still_joint = 0;             ///< the innermost of them
-  std::uint32_t steps = 0;         ///< of the current state: seeds its candidates
+  ViewList views;                     ///< of LocateBoard, later of IdentifyLink
+  std::uint32_t view = 0;             ///< position in `views`, in VerifyBoard in `target_views`
+  std::uint32_t searches = 0;         ///< for the board that found none: all views of one list were in vain
+  bool camera_on_flange = false;      ///< identified
+  std::uint32_t observations = 0;     ///< views of the board taken for the calibration
+  std::uint32_t views_asked_for = 0;  ///< by Validate, where the last view contradicts the others; 0: it did not ask
+  std::uint32_t failed_looks = 0;     ///< in a row, at calibration views
+  std::uint32_t still_images = 0;     ///< joints that moved without moving the image
+  int still_joint = 0;                ///< the innermost of them
+  std::uint32_t steps = 0;            ///< of the current state: seeds its candidates
   std::uint32_t sweep_views = 0;
   std::uint32_t explore_views = 0;
   std::uint32_t replans = 0;        ///< in a row, without a view between
   std::uint32_t interruptions = 0;  ///< of motions by the guardian or a new obstacle
+  StampOffsets stamp_offsets;       ///< as solved, for the frames of the map
   bool stamps_wrong = false;        ///< frames on the way fit no offset that is looked for
   bool calibration_accepted = false;
   FixedVector<TouchedPoint, kTouchPointsMax> touches;
@@ -75,7 +78,10 @@ struct Progress {
   Instant played_at{};
   bool played = false;
   Ending ending;
-  NextViewResult chosen;  ///< the view that Explore goes for
+  NextViewResult chosen;         ///< the view that Explore goes for
+  bool chosen_ahead = false;     ///< before the look before it
+  std::uint64_t unknown = 0;     ///< voxels after the latest look of Sweep or Explore
+  CalibrationViewResult aiming;  ///< the view that Collect goes for
 };
 
 class Machine {
@@ -152,6 +158,15 @@ class Machine {
   void withdraw_trip();
   [[nodiscard]] bool travelling() const { return travelling_; }
 
+  /// Starts a job for after the look that the arm is under way to. Nobody waits for it; foreseen() has its result,
+  /// once, unless the trip came to nothing or another began.
+  void foresee(JobKind kind);
+  [[nodiscard]] std::optional<NextViewResult> foreseen_view() { return std::exchange(foreseen_view_, std::nullopt); }
+  [[nodiscard]] std::optional<CalibrationViewResult> foreseen_calibration_view() {
+    return std::exchange(foreseen_calibration_view_, std::nullopt);
+  }
+  void forget_foreseen();
+
   /// Waits until the arm has settled, then collects `count` frames with their poses.
   void start_look(bool depth, int count);
   /// Looks at the board once more from the same stop, at once, because the picture moved. False: not again, that was
@@ -184,6 +199,7 @@ class Machine {
   template <typename Frames>
   [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending, std::uint64_t& unposed);
   void pose_pending_frames();
+  void remember_foreseen(const JobCompleted& done);
   void note_way_frame(const MachineEvent& event);
   void see_way_frames();
   [[nodiscard]] std::optional<PosedFrame> posed(const hal::Frame& frame) const;
@@ -219,6 +235,9 @@ class Machine {
   std::uint32_t job_number_ = 0;
   std::uint32_t awaited_ = 0;
   std::uint32_t integrate_job_ = 0;
+  std::uint32_t foreseeing_job_ = 0;
+  std::optional<NextViewResult> foreseen_view_;
+  std::optional<CalibrationViewResult> foreseen_calibration_view_;
   std::array<std::byte, 8192> arguments_{};
 
   bool travelling_ = false;

@@ -25,7 +25,8 @@ constexpr std::array kFromIdentify = {Transition{"camera on the flange", kCollec
 constexpr std::array kFromCollect = {Transition{"sigma reached or no view helps", kSolve}};
 constexpr std::array kFromSolve = {Transition{"solved", kValidate}};
 constexpr std::array kFromValidate = {Transition{"accepted", kSweep},
-                                      Transition{"accepted, touch test asked for", kTouchTest}};
+                                      Transition{"accepted, touch test asked for", kTouchTest},
+                                      Transition{"the last view contradicts", kCollect}};
 constexpr std::array kFromTouchTest = {Transition{"touches agree", kSweep}};
 constexpr std::array kFromVerify = {Transition{"stored calibration holds", kSweep}};
 constexpr std::array kFromSweep = {Transition{"nothing more in the sweep", kChoose}};
@@ -33,7 +34,8 @@ constexpr std::array kFromChoose = {Transition{"view chosen", kPlan}, Transition
                                     Transition{"surroundings not free", kLook}};
 constexpr std::array kFromPlan = {Transition{"certified", kMove}, Transition{"not certified", kChoose}};
 constexpr std::array kFromMove = {Transition{"arrived or interrupted", kLook}};
-constexpr std::array kFromLook = {Transition{"frame integrated", kChoose}};
+constexpr std::array kFromLook = {Transition{"frame integrated", kChoose},
+                                  Transition{"frame integrated, next view chosen before", kPlan}};
 constexpr std::array kFromPark = {Transition{"parked", kReport}};
 constexpr std::array kFromReport = {Transition{"reported", kReady}};
 constexpr std::array kFromPaused = {Transition{"resume", kLocateBoard},

@@ -73,9 +73,15 @@ std::string wall_section(const RunRecord& record) {
   table.row({"largest heap of a job, measured", mib_text(w.job_heap_peak_bytes)});
   table.row({"workers", fmt::format("{}", w.workers)});
   table.row({"folder", w.folder});
+  HtmlTable jobs({"computing", "times", "mean", "longest"}, 1);
+  for (const JobTimesRecord& job : w.jobs) {
+    jobs.row({job.name, fmt::format("{}", job.count),
+              fmt::format("{:.1f} ms", 1e3 * job.total_s / static_cast<double>(job.count)),
+              fmt::format("{:.1f} ms", 1e3 * job.longest_s)});
+  }
   return section(
       "machine", "This computer",
-      table.html() +
+      table.html() + (jobs.empty() ? "" : jobs.html()) +
           paragraph(
               "Everything above is the same for every run with this seed and configuration, whatever the number of "
               "workers; these figures are not."));

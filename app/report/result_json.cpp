@@ -116,6 +116,9 @@ Json memory_json(const MemoryRecord& memory) {
 }
 
 Json wall_json(const WallRecord& wall) {
+  Json jobs = Json::array();
+  for (const JobTimesRecord& job : wall.jobs)
+    jobs.push_back({{"name", job.name}, {"count", job.count}, {"total_s", job.total_s}, {"longest_s", job.longest_s}});
   return {{"started", wall.started},
           {"total_s", wall.total_s},
           {"stall_s", wall.stall_s},
@@ -125,7 +128,8 @@ Json wall_json(const WallRecord& wall) {
           {"job_heap_peak_bytes", wall.job_heap_peak_bytes},
           {"library_bytes", wall.library_bytes},
           {"folder", wall.folder},
-          {"workers", wall.workers}};
+          {"workers", wall.workers},
+          {"jobs", std::move(jobs)}};
 }
 
 Json way_json(const std::optional<TruthRecord::Way>& way) {

@@ -211,6 +211,14 @@ struct MemoryRecord {
   std::vector<PoolRecord> pools;
 };
 
+/// What the jobs of one kind took by the computer's clock.
+struct JobTimesRecord {
+  std::string name;
+  std::uint64_t count = 0;
+  double total_s = 0;
+  double longest_s = 0;
+};
+
 /// What differs from run to run. Only result.json's `wall` and the report's last section show it.
 struct WallRecord {
   std::string started;  ///< UTC, ISO 8601
@@ -225,6 +233,7 @@ struct WallRecord {
   std::uint64_t library_bytes = 0;        ///< resident pages of files: program and shared libraries
   std::string folder;
   int workers = 0;
+  std::vector<JobTimesRecord> jobs;  ///< those that ran
 };
 
 /// The simulator's grade. Null in result.json without a simulated cell; a member is null when it was not determined.

@@ -373,6 +373,12 @@ WallRecord Cart::wall_record() const {
   wall.job_heap_peak_bytes = job_heap_peak_bytes_;
   wall.library_bytes = resident_file_bytes();
   wall.workers = config_.workers;
+  for (std::uint16_t kind = 1; kind <= static_cast<std::uint16_t>(kLastJobKind); ++kind) {
+    const JobTimes& times = jobs_->times(static_cast<JobKind>(kind));
+    if (times.count == 0) continue;
+    wall.jobs.push_back(
+        {std::string(name_of(static_cast<JobKind>(kind))), times.count, times.total_s, times.longest_s});
+  }
   return wall;
 }
 

@@ -114,6 +114,8 @@ void bench_map(const Options& options, Report& report);
 void bench_gain(const Options& options, Report& report);
 void bench_motion(const Options& options, Report& report);
 void bench_views(const Options& options, Report& report);
+/// Not one of those that run without a name.
+void bench_thesis_tuning(const Options& options, Report& report);
 void bench_loop(const Options& options, Report& report);
 
 }  // namespace firstlook::bench

@@ -4,23 +4,14 @@
 
 #include <algorithm>
 
-#include "algorithms/view_planning/thesis_views.hpp"
 #include "platform/loop/worker_pool.hpp"
 #include "tests/bench/bench.hpp"
-#include "tests/bench/explored_cell.hpp"
+#include "tests/bench/exploration.hpp"
 
 namespace firstlook::bench {
 namespace {
 
 constexpr int kWorkers = 2;
-constexpr int kStopsMax = 400;
-
-Result<ViewChoice> choose(ExploredCell& cell, const ViewContext& context, const ExploreOptions& options,
-                          WorkerPool& workers) {
-  return cell.chooser().choose(context, cell.joints(), options, [&workers](int n, IndexedBody body) {
-    workers.parallel_for(n, [&body](int index, int worker) { body(index, worker); });
-  });
-}
 
 void bench_choice(const Options& options, Report& report) {
   constexpr int kCandidates = 840;  // of these at least 500 must be found free, as the goal says
@@ -34,7 +25,7 @@ void bench_choice(const Options& options, Report& report) {
   const int choices = options.amount(2, 12, 40);
   for (explore.step = 0; static_cast<int>(explore.step) < choices; ++explore.step) {
     const double start = wall_seconds(), computed = process_seconds();
-    const auto choice = choose(cell, cell.context(), explore, workers);
+    const auto choice = choose_ours(cell, cell.context(), explore, workers);
     const double seconds = wall_seconds() - start, computing = process_seconds() - computed;
     // The last one is the certificate that ends exploration, many times as dear; it is no choice.
     if (!choice || choice->outcome != ViewChoice::Outcome::kChosen) break;
@@ -50,64 +41,6 @@ void bench_choice(const Options& options, Report& report) {
   // Both threads together, whatever else the machine does: half of it is what an idle one would take at best.
   report.add(timed("views/choose/5cm/computing", 1e3 * median(computing_s), "ms", "", std::nullopt, Goal::none()));
   report.add(timed("views/choose/5cm/longest", 1e3 * quantile(choices_s, 1), "ms", "", std::nullopt, Goal::none()));
-}
-
-enum class Views : std::uint8_t { kOurs, kThesis, kOmniscient };
-
-/// One exploration of a cell while it goes on.
-struct Exploration {
-  ExploredCell& cell;
-  Views views;
-  WorkerPool& workers;
-  ExploreOptions options;
-  ThesisOptions drawing;
-  bool surfaces_count = false;
-
-  [[nodiscard]] ViewContext context() {
-    return views == Views::kOmniscient ? cell.omniscient_context(surfaces_count) : cell.context();
-  }
-  [[nodiscard]] Result<ViewChoice> choose_now() {
-    options.timing.limits = drawing.limits = cell.timing().limits;
-    const ViewContext now = context();
-    return views == Views::kThesis ? choose_as_thesis(now, cell.joints(), cell.chooser().planner(), drawing)
-                                   : choose(cell, now, options, workers);
-  }
-  /// False when no view is left.
-  [[nodiscard]] bool choose_view(Path& path) {
-    for (const auto pace : {ExploredCell::Pace::kRoomy, ExploredCell::Pace::kNormal, ExploredCell::Pace::kSlow}) {
-      cell.set_pace(pace);
-      const Result<ViewChoice> choice = choose_now();
-      if (choice && choice->outcome == ViewChoice::Outcome::kChosen) {
-        path = choice->path;
-        return true;
-      }
-      if (choice && choice->outcome == ViewChoice::Outcome::kComplete) return false;
-    }
-    return false;
-  }
-};
-
-/// Explores a cell to its end, or to 99 % of what can be observed: what comes then has no figure here.
-ExploredCell::Way explore(std::uint64_t seed, Views views, WorkerPool& workers) {
-  const bool omniscient = views == Views::kOmniscient, thesis = views == Views::kThesis;
-  ExploredCell cell(fmt::format("random:{}", seed), seed, omniscient ? 1500 : 320, kWorkers);
-  cell.find_truth(workers);
-  if (thesis) cell.sweep(false);  // ours is over at once: the first view tells more a second
-  Exploration exploration{cell, views, workers, {}, {}};
-  exploration.drawing.seed = exploration.options.seed = seed;
-  if (omniscient) exploration.options.refined = 64;
-  while (!cell.way().to_99 && cell.way().end.stops < kStopsMax) {
-    Path path;
-    if (!exploration.choose_view(path)) {
-      if (!omniscient || exploration.surfaces_count) break;
-      exploration.surfaces_count = true;  // nothing else is left
-      continue;
-    }
-    ++exploration.options.step, ++exploration.drawing.step;
-    cell.follow(path, !thesis);
-    if (!thesis) cell.chooser().remember_look(exploration.context(), cell.joints());
-  }
-  return cell.way();
 }
 
 using Reached = std::optional<ExploredCell::Reached>;

@@ -49,6 +49,17 @@ class ScriptedWorld : public DecisionSink {
     r.path.push_back({to, 0.5, 1.0});
     return r;
   };
+  std::function<CalibrationViewResult(const FromHere&)> calibration_view = [](const FromHere& a) {
+    CalibrationViewResult r;
+    r.found = true;
+    r.path = beside(a);
+    return r;
+  };
+  std::function<PlanResult(const PlanArguments&)> certify = [](const PlanArguments&) {
+    PlanResult r;
+    r.found = true;
+    return r;
+  };
   SolveResult solve = [] {
     SolveResult r;
     r.solved = true;
@@ -56,6 +67,7 @@ class ScriptedWorld : public DecisionSink {
     return r;
   }();
   ValidateResult validate{.accepted = true};
+  std::function<ValidateResult()> validating;  ///< what it says instead; may be empty
   std::function<TouchTestResult(const TouchTestArguments&)> touch_test = [](const TouchTestArguments&) {
     TouchTestResult r;
     r.usable = r.agrees = true;
@@ -73,6 +85,7 @@ class ScriptedWorld : public DecisionSink {
     return r;
   }();
   IntegrateResult integrated{.used = true, .path_free = true};
+  std::function<void(IntegrateResult&)> integrating;  ///< what else a frame's integration says; may be empty
   CheckBoardResult check{.seen = 1, .moved = 0};
   int locate_views = 4;
   Fault no_views_because = Fault::kNothingReachable;
@@ -159,6 +172,15 @@ class ScriptedWorld : public DecisionSink {
     fire_timers();
   }
 
+  /// A view beside where the arm stands.
+  static Route beside(const FromHere& here) {
+    JointVector to = here.at_rad;
+    to[4] += 0.05;
+    Route route;
+    route.push_back({to, 0.5, 1.0});
+    return route;
+  }
+
   /// What the script says to a job: its packed result; the size is returned.
   std::size_t pack_answer(JobKind kind, std::span<const std::byte> arguments, std::span<std::byte> result) const {
     switch (kind) {
@@ -168,22 +190,15 @@ class ScriptedWorld : public DecisionSink {
         return pack(views_around(arguments_of<FromHere>(arguments).at_rad, 6), result);
       case JobKind::kPlan:
         return pack(plan(arguments_of<PlanArguments>(arguments)), result);
-      case JobKind::kCertifyPath: {
-        PlanResult r;
-        r.found = true;
-        return pack(r, result);
-      }
+      case JobKind::kCertifyPath:
+        return pack(certify(arguments_of<PlanArguments>(arguments)), result);
       case JobKind::kDetectBoard:
         return pack(detected(arguments_of<DetectArguments>(arguments)), result);
-      case JobKind::kNextCalibrationView: {
-        CalibrationViewResult r;
-        r.found = true;
-        r.path = beside(arguments);
-        return pack(r, result);
-      }
+      case JobKind::kNextCalibrationView:
+        return pack(calibration_view(arguments_of<FromHere>(arguments)), result);
       case JobKind::kNextVerificationView: {
         VerificationViewResult r = verification_view;
-        r.path = beside(arguments);
+        r.path = beside(arguments_of<FromHere>(arguments));
         return pack(r, result);
       }
       case JobKind::kVerifyCalibration:
@@ -191,11 +206,12 @@ class ScriptedWorld : public DecisionSink {
       case JobKind::kSolve:
         return pack(solve, result);
       case JobKind::kValidate:
-        return pack(validate, result);
+        return pack(validating ? validating() : validate, result);
       case JobKind::kIntegrate: {
         IntegrateResult r = integrated;
         looks += arguments_of<IntegrateArguments>(arguments).at_view ? 1 : 0;
         r.at_view = arguments_of<IntegrateArguments>(arguments).at_view;
+        if (integrating) integrating(r);
         return pack(r, result);
       }
       case JobKind::kNextSweepView:
@@ -299,14 +315,6 @@ class ScriptedWorld : public DecisionSink {
     ViewList list = views_around(at, locate_views);
     list.fault = no_views_because;
     return list;
-  }
-  /// A view beside where the arm stands.
-  static Route beside(std::span<const std::byte> from_here) {
-    JointVector to = arguments_of<FromHere>(from_here).at_rad;
-    to[4] += 0.05;
-    Route route;
-    route.push_back({to, 0.5, 1.0});
-    return route;
   }
   void answer_jobs() {
     std::vector<std::byte> bytes(16384);

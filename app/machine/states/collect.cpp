@@ -1,32 +1,60 @@
 /// Collect: the views of the board from which the hand-eye transform is solved, each chosen for what it adds.
+#include <algorithm>
+
 #include "app/machine/states/states.hpp"
 
 namespace firstlook::states {
 namespace {
 constexpr std::uint32_t kFailedLooksMax = 24;  // in a row: the first turns are made blindly and may lose the board
+constexpr std::uint32_t kForeseenFrom = 6;  // observations, from which on a view hardly changes what the next should be
 
 void next_view(Machine& m) {
   Progress& p = m.progress();
-  if (p.observations >= static_cast<std::uint32_t>(m.settings().calibration_views_max)) {
+  const auto most = static_cast<std::uint32_t>(m.settings().calibration_views_max);
+  if (p.observations >= std::max(most, p.views_asked_for)) {
     m.transition(StateId::kSolve);
     return;
   }
   m.start_job(JobKind::kNextCalibrationView, FromHere{m.arm().position_rad, p.steps++, m.now().seconds()});
 }
 
-void take(Machine& m, const CalibrationViewResult& choice) {
+void go(Machine& m) {
+  Progress& p = m.progress();
+  if (p.aiming.sigma_mm > 0) {
+    m.show("calibration view {}: predicted sigma {:.2f} mm, {:.2f} mrad", p.observations + 1, p.aiming.sigma_mm,
+           p.aiming.sigma_mrad);
+  } else {
+    m.show("calibration view {}: a small turn, to learn where the camera sits", p.observations + 1);
+  }
+  m.start_trip(p.aiming.path, Machine::OnTheWay::kSeeBoard);
+  const auto most = static_cast<std::uint32_t>(m.settings().calibration_views_max);
+  if (p.observations >= kForeseenFrom && p.observations + 1 < most && m.settings().targets == 1)
+    m.foresee(JobKind::kNextCalibrationView);
+}
+
+/// Where the view was chosen on the way here the arm stands a little beside the place that it was chosen for.
+void certify_from_here(Machine& m) {
+  PlanArguments plan;
+  plan.from_rad = m.arm().position_rad;
+  plan.phase = MotionPhase::kBeforeCalibration;
+  plan.now_s = m.now().seconds();
+  plan.path = m.progress().aiming.path;
+  if (!plan.path.empty()) plan.to_rad = plan.path.back().target_rad;
+  m.start_job(JobKind::kCertifyPath, plan);
+}
+
+void take(Machine& m, const CalibrationViewResult& choice, bool foreseen) {
   Progress& p = m.progress();
   const bool enough = p.observations >= static_cast<std::uint32_t>(m.settings().calibration_views_min);
-  if (choice.target_met && enough) {
+  if (choice.target_met && enough && p.observations >= p.views_asked_for) {
     m.transition(StateId::kSolve);
   } else if (choice.found) {
-    if (choice.sigma_mm > 0) {
-      m.show("calibration view {}: predicted sigma {:.2f} mm, {:.2f} mrad", p.observations + 1, choice.sigma_mm,
-             choice.sigma_mrad);
+    p.aiming = choice;
+    if (foreseen) {
+      certify_from_here(m);
     } else {
-      m.show("calibration view {}: a small turn, to learn where the camera sits", p.observations + 1);
+      go(m);
     }
-    m.start_trip(choice.path, Machine::OnTheWay::kSeeBoard);
   } else if (enough) {
     m.transition(StateId::kSolve);
   } else {
@@ -50,7 +78,13 @@ void enter_collect(Machine& m) { next_view(m); }
 Handled on_collect(Machine& m, const MachineEvent& event) {
   Progress& p = m.progress();
   if (const auto choice = m.result_of<CalibrationViewResult>(JobKind::kNextCalibrationView, event)) {
-    take(m, *choice);
+    take(m, *choice, false);
+  } else if (const auto plan = m.result_of<PlanResult>(JobKind::kCertifyPath, event)) {
+    if (plan->found) {
+      go(m);
+    } else {
+      next_view(m);
+    }
   } else if (m.advance_look(event)) {
     m.start_job(JobKind::kDetectBoard,
                 DetectArguments{BoardLook::kCollect, p.observations, m.look(), m.looks(), m.depth_beside()});
@@ -60,6 +94,10 @@ Handled on_collect(Machine& m, const MachineEvent& event) {
       note_targets(m, seen->targets);
       ++p.observations;
       p.failed_looks = 0;
+      if (const auto next = m.foreseen_calibration_view(); next && next->found) {
+        take(m, *next, true);
+        return Handled::kNo;
+      }
     } else if (++p.failed_looks > kFailedLooksMax) {
       m.conclude(Outcome::kCalibrationRejected, Fault::kBoardNotFound);
       return Handled::kNo;

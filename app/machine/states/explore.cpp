@@ -4,6 +4,9 @@
 namespace firstlook::states {
 namespace {
 constexpr std::uint32_t kReplansMax = 8;  // in a row, without a view between
+// Voxels. A look that is expected to tell no more hardly changes what comes next: it is chosen on the way there. What
+// it has told then decides whether it stands.
+constexpr std::uint32_t kFew = 40;
 
 /// As in views.csv, where the sweep's come first.
 std::uint32_t next_number(const Progress& p) { return p.sweep_views + p.explore_views + 1; }
@@ -15,6 +18,7 @@ void enter_choose(Machine& m) {
     m.transition(StateId::kVerifyBoard);
     return;
   }
+  p.chosen_ahead = false;
   m.start_job(JobKind::kNextView, FromHere{m.arm().position_rad, p.steps++, m.now().seconds()});
 }
 
@@ -42,6 +46,7 @@ void enter_plan(Machine& m) {
   plan.now_s = m.now().seconds();
   plan.path = m.progress().chosen.path;
   if (!plan.path.empty()) plan.to_rad = plan.path.back().target_rad;
+  plan.foreseen = m.progress().chosen_ahead;
   m.start_job(JobKind::kCertifyPath, plan);
 }
 
@@ -65,6 +70,7 @@ void enter_move(Machine& m) {
     m.show("view {}: another look, to have room to move", next_number(p));
   }
   m.start_trip(p.chosen.path, Machine::OnTheWay::kMap);
+  if (p.chosen.gain_expected > 0 && p.chosen.gain_expected <= kFew) m.foresee(JobKind::kNextView);
 }
 
 Handled on_move(Machine& m, const MachineEvent& event) {
@@ -89,8 +95,15 @@ Handled on_look(Machine& m, const MachineEvent& event) {
   if (m.advance_look(event)) {
     m.integrate(m.look()[0], true);
   } else if (const auto result = m.integrate_result(event); result && result->at_view) {
-    ++m.progress().explore_views;
-    m.transition(StateId::kChoose);
+    Progress& p = m.progress();
+    ++p.explore_views;
+    const bool told_little = result->used && p.unknown <= result->unknown + kFew;
+    p.unknown = result->unknown;
+    const auto next = m.foreseen_view();
+    p.chosen_ahead = next && next->found && told_little &&
+                     p.explore_views < static_cast<std::uint32_t>(m.settings().explore_views_max);
+    if (p.chosen_ahead) p.chosen = *next;
+    m.transition(p.chosen_ahead ? StateId::kPlan : StateId::kChoose);
   }
   return Handled::kNo;
 }

@@ -23,7 +23,7 @@ Handled on_solve(Machine& m, const MachineEvent& event) {
       }
       m.progress().relevant = result->targets;
       m.progress().stamps_wrong = result->stamps_wrong;
-      if (!result->stamps_wrong) m.correct_stamps(result->offsets);
+      m.progress().stamp_offsets = result->offsets;
       m.transition(StateId::kValidate);
     } else {
       m.conclude(Outcome::kCalibrationRejected, result->fault);

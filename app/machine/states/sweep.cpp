@@ -65,6 +65,7 @@ Handled on_sweep(Machine& m, const MachineEvent& event) {
     m.integrate(m.look()[0], true);
   } else if (const auto result = m.integrate_result(event); result && result->at_view) {
     ++p.sweep_views;
+    p.unknown = result->unknown;
     next_view(m);
   } else if (const auto choice = m.result_of<NextViewResult>(JobKind::kNextSweepView, event)) {
     take(m, *choice);

@@ -208,6 +208,106 @@ TEST_CASE("a rejected calibration maps nothing", "[machine]") {
   CHECK_FALSE(world.was_in(StateId::kSweep));
 }
 
+TEST_CASE("one view at the end that contradicts the others is no verdict yet: two more are taken, once", "[machine]") {
+  const bool it_was_wrong_by_itself = GENERATE(true, false);
+  ScriptedWorld world;
+  std::vector<std::uint32_t> observations;
+  world.validating = [&] {
+    observations.push_back(world.machine.progress().observations);
+    const bool settled = observations.size() == 2 && it_was_wrong_by_itself;
+    return ValidateResult{.accepted = settled, .more_views_tell = !settled};
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  REQUIRE(observations.size() == 2);
+  CHECK(observations[1] == observations[0] + 2);
+  CHECK(world.ending.outcome == (it_was_wrong_by_itself ? Outcome::kDone : Outcome::kCalibrationRejected));
+  CHECK(world.was_in(StateId::kSweep) == it_was_wrong_by_itself);
+}
+
+TEST_CASE("a calibration view is chosen on the way to the one before, and certified from where the arm stands",
+          "[machine]") {
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.calibration_views_max = 12;
+  ScriptedWorld world(settings);
+  int ahead = 0, due = 0, certified = 0;
+  bool certifies = GENERATE(true, false);
+  world.calibration_view = [&](const FromHere& here) {
+    ++(here.after_look ? ahead : due);
+    CalibrationViewResult r;
+    r.found = true;
+    r.path = ScriptedWorld::beside(here);
+    return r;
+  };
+  world.certify = [&](const PlanArguments& a) {
+    if (a.phase == MotionPhase::kBeforeCalibration) {
+      ++certified;
+      CHECK((a.from_rad - world.position_rad()).max_abs() < 1e-9);
+    }
+    PlanResult r;
+    r.found = a.phase != MotionPhase::kBeforeCalibration || certifies;
+    return r;
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_to_end());
+  CHECK(world.machine.progress().observations == 12);
+  // The first six tell the model, the last has none after it.
+  CHECK(ahead == 5);
+  CHECK(certified == 5);
+  CHECK(due == (certifies ? 7 : 12));
+}
+
+TEST_CASE("a view of Explore that tells little is followed by the one chosen on the way; others, or a pause, ask anew",
+          "[machine]") {
+  enum class Case { kLittle, kMuch, kExpectedMuch, kNotUsed, kPaused };
+  const Case which = GENERATE(Case::kLittle, Case::kMuch, Case::kExpectedMuch, Case::kNotUsed, Case::kPaused);
+  MachineSettings settings = ScriptedWorld::default_settings();
+  settings.explore_views_max = 6;
+  ScriptedWorld world(settings);
+  int ahead = 0, due = 0, foreseen = 0;
+  std::uint64_t unknown = 100000;
+  world.next_view = [&](const FromHere& here) {
+    ++(here.after_look ? ahead : due);
+    NextViewResult r;
+    r.found = world.was_in(StateId::kChoose) || here.step < 1;
+    r.path = ScriptedWorld::beside(here);
+    r.gain_expected = which == Case::kExpectedMuch ? 10000 : 20;
+    return r;
+  };
+  world.certify = [&](const PlanArguments& a) {
+    foreseen += a.foreseen ? 1 : 0;
+    PlanResult r;
+    r.found = true;
+    return r;
+  };
+  world.integrating = [&](IntegrateResult& r) {
+    r.used = which != Case::kNotUsed;
+    if (which == Case::kMuch) unknown -= 1000;
+    r.unknown = unknown;
+  };
+  world.run_until(StateId::kReady);
+  world.press(OperatorAction::kPlay);
+  REQUIRE(world.run_until(StateId::kMove));
+  REQUIRE(world.run_until(StateId::kLook));
+  if (which == Case::kPaused) {
+    world.consent = false;
+    REQUIRE(world.run_until(StateId::kPaused, 1));
+    world.consent = true;
+    const int due_before = due;
+    REQUIRE(world.run_until(StateId::kMove, 5));
+    CHECK(due == due_before + 1);
+    CHECK(foreseen == 0);
+  }
+  REQUIRE(world.run_to_end());
+  CHECK(world.ending.outcome == Outcome::kDone);
+  CHECK(world.machine.progress().explore_views == 6);
+  const bool little = which == Case::kLittle || which == Case::kPaused;
+  CHECK(foreseen == (little ? 5 : 0));  // after the last of the six none is chosen
+  CHECK((ahead == 0) == (which == Case::kExpectedMuch));
+}
+
 TEST_CASE("a board that moved rejects the map", "[machine]") {
   ScriptedWorld world;
   world.check.moved = 1;

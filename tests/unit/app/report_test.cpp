@@ -138,7 +138,7 @@ TEST_CASE("sections that did not run are null, and numbers that are not finite, 
 
 TEST_CASE("only wall differs between two runs of one record", "[report]") {
   RunRecord first = sample_record(), second = sample_record();
-  second.wall = {"2027-02-02T02:02:02Z", 1, 2, true, 3, 4, 5, 6, "/elsewhere", 1};
+  second.wall = {"2027-02-02T02:02:02Z", 1, 2, true, 3, 4, 5, 6, "/elsewhere", 1, {}};
   ordered_json a = ordered_json::parse(result_json(first)), b = ordered_json::parse(result_json(second));
   CHECK(a["wall"] != b["wall"]);
   a.erase("wall");

@@ -224,8 +224,17 @@ RunRecord make_record() {
                   .sensor = "full",
                   .config_yaml = "cell: workshop\n",
                   .journal_hash = "77aa01"};
-  r.wall = {"2026-01-31T12:00:00Z", 71.3, 4.2, false, 180u << 20, 30u << 20, 70u << 20, 40u << 20,
-            "runs/20260131-7",      2};
+  r.wall = {"2026-01-31T12:00:00Z",
+            71.3,
+            4.2,
+            false,
+            180u << 20,
+            30u << 20,
+            70u << 20,
+            40u << 20,
+            "runs/20260131-7",
+            2,
+            {{"choosing the next view", 48, 6.5, 0.3}}};
   r.alignment = alignment();
   r.truth = TruthRecord{0.21,
                         0.34,

@@ -129,11 +129,12 @@ TEST_CASE("a board that moves before the last views, or after the first, is no c
       INFO(views_after << (at_the_end ? " last" : " first"));
       for (const int allowed : {0, 1}) {
         HandEyeOptions options;
-        options.limits.gated_at_end_max = allowed;
+        (at_the_end ? options.limits.gated_last_max : options.limits.gated_first_max) = allowed;
         const auto result = calibrate_hand_eye(setup.camera, setup.board, views, options);
         REQUIRE(result);
         const bool accepts = views_after <= static_cast<std::size_t>(allowed);
         CHECK((result->verdict == Verdict::kAccepted) == accepts);
+        CHECK(result->only_last_contradicts == (at_the_end && views_after == 1 && allowed == 0));
         if (!accepts) {
           REQUIRE_FALSE(result->reasons.empty());
           CHECK_THAT(result->reasons[0], Catch::Contains(at_the_end ? "last" : "first") && Catch::Contains("moved"));
@@ -148,7 +149,7 @@ TEST_CASE("a board that moves before the last views, or after the first, is no c
   const auto others = test::observe_views(moved, 2, random);
   views[5] = others[0], views[9] = others[1];
   HandEyeOptions options;
-  options.limits.gated_at_end_max = 0;
+  options.limits.gated_last_max = 0;
   const auto result = calibrate_hand_eye(setup.camera, setup.board, views, options);
   REQUIRE(result);
   CHECK(result->verdict == Verdict::kAccepted);

@@ -104,6 +104,24 @@ TEST_CASE("a base turn of a stretched arm is limited by its farthest point") {
   CHECK(bound <= 1.031 * lever_m);
 }
 
+TEST_CASE("the least duration is no more than the duration, and near it") {
+  Random random(5);
+  const ArmModel arm = *find_arm_model("ur5");
+  double share = 0;
+  constexpr int kSegments = 2000;
+  for (int i = 0; i < kSegments; ++i) {
+    const JointVector from = random_joints(random, std::numbers::pi);
+    const JointVector to = from + random_joints(random, i % 2 == 0 ? 1.5 : 0.1);
+    const double duration_s = time_segment(arm, arm.body, from, to, {}).duration_s;
+    const double least_s = least_duration_s(arm, arm.body, from, to, {});
+    REQUIRE(least_s <= duration_s * (1 + 1e-12));
+    share += least_s / duration_s / kSegments;
+  }
+  CHECK(share > 0.9);
+  const JointVector q = random_joints(random, 1);
+  CHECK(least_duration_s(arm, arm.body, q, q, {}) == 0);
+}
+
 TEST_CASE("a segment of no length takes no time") {
   const ArmModel arm = *find_arm_model("ur5");
   const JointVector q = default_start(arm);

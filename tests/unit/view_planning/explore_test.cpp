@@ -175,3 +175,46 @@ TEST_CASE("an arm that does not stand free gets no view", "[explore]") {
   REQUIRE_FALSE(choice);
   REQUIRE(choice.error().fault == Fault::kStartBlocked);
 }
+
+TEST_CASE("the view after a look that is still to come: another, and the choice before stands as it was", "[explore]") {
+  SmallWorld world(room_with_wall());
+  ViewChooser chooser(world.map.geometry(), world.sensor, 200, 1);
+  ViewChooser alone(world.map.geometry(), world.sensor, 200, 1);
+  world.look(world.q);
+  JointVector beside = world.q;
+  beside[0] += 0.2;
+  world.look(beside);
+  world.update();
+  ExploreOptions options;
+  const auto first = chooser.choose(world.context(), world.q, options, run_serially);
+  const auto same = alone.choose(world.context(), world.q, options, run_serially);
+  REQUIRE(first);
+  REQUIRE(same);
+  REQUIRE(first->target == same->target);
+  options.step = 1;
+  options.after_look = true;
+  const auto next = chooser.choose(world.context(), first->target, options, run_serially);
+  REQUIRE(next);
+  REQUIRE(next->outcome == ViewChoice::Outcome::kChosen);
+  CHECK(next->path.waypoints.front() == first->target);
+  CHECK(world.entries_into_unknown(next->path) == 0);
+  // What the first look tells counts no more.
+  GainWorker worker = chooser.gain().worker();
+  const ViewGain before = chooser.gain().count(world.context(), next->target, worker);
+  CHECK(next->gain.weight() <= before.weight());
+  // The look is remembered as if nothing had been chosen meanwhile.
+  world.follow(first->path);
+  chooser.remember_look(world.context(), world.q);
+  alone.remember_look(world.context(), world.q);
+  for (std::size_t i = 0; i < world.map.geometry().count(); ++i) {
+    REQUIRE(chooser.gain().futile().count(i) == alone.gain().futile().count(i));
+  }
+  options.after_look = false;
+  options.step = 2;
+  const auto a = chooser.choose(world.context(), world.q, options, run_serially);
+  const auto b = alone.choose(world.context(), world.q, options, run_serially);
+  REQUIRE(a);
+  REQUIRE(b);
+  CHECK(a->target == b->target);
+  CHECK(a->utility_per_s == b->utility_per_s);
+}

@@ -234,3 +234,57 @@ TEST_CASE("an earlier map says where to look first, and nothing else", "[gain]")
     }
   }
 }
+
+TEST_CASE("a look that is assumed counts no more, the others count what it leaves, and nothing stays of it", "[gain]") {
+  SmallWorld world(Truth::room());
+  world.look(world.q);
+  world.update();
+  GainModel gain(world.map.geometry(), world.sensor);
+  GainWorker worker = gain.worker();
+  JointVector there = world.q, aside = world.q, away = world.q;
+  there[0] += 0.5;
+  aside[0] += 0.8;
+  away[0] -= 1.5;
+  gain.prepare(world.context());
+  const auto count = [&](const JointVector& q) { return gain.count(world.context(), q, worker).unknown; };
+  const std::uint32_t there_before = count(there), aside_before = count(aside), away_before = count(away);
+  const std::vector<std::uint32_t> frontier(gain.frontier().begin(), gain.frontier().end());
+  REQUIRE(there_before > 100);
+  REQUIRE(gain.assume_look(world.context(), there, worker));
+  CHECK(count(there) == 0);
+  CHECK(count(aside) < aside_before);
+  CHECK(count(aside) > 0);
+  CHECK(count(away) == away_before);
+  CHECK(gain.frontier().size() < frontier.size());
+  gain.prepare(world.context());
+  CHECK(count(there) == there_before);
+  CHECK(std::ranges::equal(gain.frontier(), frontier));
+}
+
+TEST_CASE("counting at most and then what is doubtful is counting", "[gain]") {
+  SmallWorld world(Truth::room());
+  world.look(world.q);
+  world.update();
+  GainModel gain(world.map.geometry(), world.sensor);
+  // A frame without any return: what lies beyond the map is open there.
+  const CameraIntrinsics& c = world.sensor.intrinsics;
+  const std::vector<std::uint16_t> nothing(static_cast<std::size_t>(c.width * c.height), 0);
+  const auto base_T_depth = forward(world.arm, world.q).flange() * world.mount;
+  gain.learn_returns({{nothing.data(), c.width, c.height}, 1000}, base_T_depth, {});
+  GainWorker worker = gain.worker();
+  gain.prepare(world.context());
+  bool some_doubtful = false;
+  for (const double turn : {0.0, 0.3, 0.6, 1.2}) {
+    JointVector q = world.q;
+    q[0] += turn;
+    const ViewGain whole = gain.count(world.context(), q, worker);
+    ViewGain steps = gain.count_at_most(world.context(), q, worker);
+    CHECK(steps.weight() >= whole.weight());
+    CHECK(steps.unknown == whole.unknown);
+    gain.find_doubtful(world.context(), q, worker, steps);
+    CHECK(steps.doubtful == whole.doubtful);
+    CHECK(steps.doubtful_again == whole.doubtful_again);
+    some_doubtful = some_doubtful || whole.doubtful > 0;
+  }
+  CHECK(some_doubtful);
+}

@@ -1,4 +1,4 @@
-#include "algorithms/view_planning/parallel.hpp"
+#include "platform/core/parallel.hpp"
 
 #include <catch2/catch.hpp>
 #include <vector>
