@@ -17,7 +17,7 @@ constexpr std::array kFromBoot = {Transition{"all devices report", kReady}, Tran
 constexpr std::array kFromReady = {Transition{"Play or start button", kLocateBoard},
                                    Transition{"link lost, protective stop, shutdown", kStopped}};
 constexpr std::array kFromRunning = {Transition{"pause", kPaused},
-                                     Transition{"stop, link lost, stale stream", kStopped},
+                                     Transition{"stop, link lost, panel lost, stale stream", kStopped},
                                      Transition{"unexpected event", kFaulted}, Transition{"cannot go on", kPark}};
 constexpr std::array kFromLocate = {Transition{"board seen", kIdentifyLink},
                                     Transition{"board seen, calibration stored", kVerifyCalibration}};

@@ -74,6 +74,9 @@ void check_stop(const Json& result, double at_s) {
 
 TEST_CASE("a person, the robot or the network stops the job at once", "[scenario]") {
   check_stop(run_with("operator.stop_at=20", stopped("E5005")), 20);
+  const Json deaf = run_with("panel.lost_at=20", stopped("E5014 lost the button panel"));
+  check_stop(deaf, 20);
+  CHECK_THAT(deaf["remedy"].get<std::string>(), Catch::Contains("CAN bus") && Catch::Contains("firstlook check"));
   check_stop(run_with("arm.protective_stop_at=20", stopped("E5004")), 20);
   check_stop(run_with("arm.emergency_stop_at=20", stopped("E5004")), 20);
   check_stop(run_with("arm.emergency_stop_at=0.2", stopped("E5004")), 0.2);

@@ -30,10 +30,7 @@ Handled on_paused(Machine& m, const MachineEvent& event) {
     }
     return Handled::kYes;
   }
-  if (const auto* key = std::get_if<OperatorActed>(&event)) {
-    if (key->action == hal::OperatorAction::kStop) m.stop_for(Fault::kProgramStopped);
-    return Handled::kYes;
-  }
+  if (heed_stop(m, event) || std::holds_alternative<OperatorActed>(event)) return Handled::kYes;
   if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kState) {
     m.stop_for(Fault::kPausedTooLong);
     return Handled::kYes;

@@ -51,6 +51,8 @@ Handled on_ended(Machine& m, const MachineEvent& event);
 
 /// False from a protective or emergency stop until a person has cleared it.
 [[nodiscard]] bool may_move(hal::ArmSafety safety);
+/// Stops the job when a person asks for it, or when the panel is gone and nobody could hear them ask. True when it did.
+[[nodiscard]] bool heed_stop(Machine& m, const MachineEvent& event);
 /// Remembers from where targets were seen for the first time.
 void note_targets(Machine& m, TargetMask seen);
 /// Asks for a path from here to `target`.
