@@ -77,7 +77,7 @@ constexpr std::array kRows = {
     StateRow{kVerifyBoard, kConclude, "VerifyBoard", states::enter_verify_board, nullptr, states::on_verify_board, {}},
     StateRow{kPark, kConclude, "Park", states::enter_park, nullptr, states::on_park, kFromPark},
     StateRow{kReport, kRunning, "Report", states::enter_report, nullptr, states::on_report, kFromReport},
-    StateRow{kPaused, kNone, "Paused", states::enter_paused, nullptr, states::on_paused, kFromPaused},
+    StateRow{kPaused, kNone, "Paused", states::enter_paused, states::exit_paused, states::on_paused, kFromPaused},
     StateRow{kStopped, kNone, "Stopped", states::enter_stopped, nullptr, states::on_ended, {}},
     StateRow{kFaulted, kNone, "Faulted", states::enter_faulted, nullptr, states::on_ended, {}},
 };

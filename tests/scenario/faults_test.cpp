@@ -103,6 +103,27 @@ TEST_CASE("a pause is waited for, but not for ever", "[scenario]") {
   CHECK(given_up["safety"]["stops"][0]["time_s"].get<double>() == Approx(3620).margin(1));
 }
 
+TEST_CASE("a pause of an hour is as short in the journal as one of seconds, and replays", "[scenario]") {
+  const JobFolder folder;
+  folder.write("short.yaml", "explore: {views_max: 3}\n");
+  const auto journal_bytes = [&](const std::string& faults, int exit_code) {
+    const ProgramResult run = folder.run_job(faults, {"--config", "short.yaml", "--faults", faults});
+    INFO(run.err);
+    CHECK(run.exit_code == exit_code);
+    const ProgramResult replayed = folder.run({"replay", faults + "/journal.flj"});
+    INFO(replayed.err);
+    CHECK(replayed.exit_code == 0);
+    CHECK(replayed.out.find("stopped at its cap") == std::string::npos);
+    check_safe(folder.read_json(faults + "/result.json"));
+    return std::filesystem::file_size(folder / (faults + "/journal.flj"));
+  };
+  const std::string calibrating = "operator.pause_at=20", mapping = in_mapping("operator.pause_at", 10);
+  const auto seconds = journal_bytes(calibrating + ":5", 0);
+  CHECK(journal_bytes(calibrating + ":3590", 0) < seconds + seconds / 10);
+  CHECK(journal_bytes(calibrating, 6) < seconds);
+  CHECK(journal_bytes(mapping + ":3590", 0) < seconds + seconds / 4);  // what was known free is looked at again
+}
+
 TEST_CASE("after a long pause the surroundings are looked at again", "[scenario]") {
   const Json result = run_with(in_mapping("operator.pause_at", 20) + ":70", kDone);
   CHECK(phase_start_s(result, "Paused") == Approx(mapping_start_s() + 20).margin(0.1));

@@ -18,6 +18,9 @@ void enter_paused(Machine& m) {
   m.set_timer(MachineTimer::kState, kPauseMax_s);
 }
 
+/// What came in the pause is of no use to what follows, as in Ready: so a journal need not tell it (worth_of).
+void exit_paused(Machine& m) { m.forget_the_past(); }
+
 Handled on_paused(Machine& m, const MachineEvent& event) {
   Progress& p = m.progress();
   if (const auto* report = std::get_if<ArmReported>(&event)) {

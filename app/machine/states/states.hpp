@@ -44,6 +44,7 @@ Handled on_park(Machine& m, const MachineEvent& event);
 void enter_report(Machine& m);
 Handled on_report(Machine& m, const MachineEvent& event);
 void enter_paused(Machine& m);
+void exit_paused(Machine& m);
 Handled on_paused(Machine& m, const MachineEvent& event);
 void enter_stopped(Machine& m);
 void enter_faulted(Machine& m);
