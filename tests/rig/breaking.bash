@@ -22,10 +22,11 @@ idle() {
     'BEGIN { printf "%.0f", g / h }') times slower here)"
 }
 
-# tells CODE: the service says that fault within seconds.
+# tells CODE: the service says that fault within seconds; then the arm has stopped.
 tells() {
   await 15 "journalctl -b -u firstlook -o cat --no-pager --since=@$job_from | grep -q 'E$1 '" >/dev/null ||
     fail "firstlook should say E$1: $(guest 'journalctl -b -u firstlook -o cat --no-pager -n 8'); $(status_of)"
+  guest "sleep 1" # the arm brakes
 }
 
 # A loop that hangs while the arm moves: the robot brakes by itself, systemd makes a new process, nothing moves.
