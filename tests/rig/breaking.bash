@@ -180,6 +180,8 @@ bus_down_in_motion() {
   guest "ip link set can0 down" || fail "can0 does not go down"
   tells 5014
   stands 3 "nobody could hear the panel's stop button"
+  # The new process gives the panel up after 6 s, then asks every device for as long.
+  await 30 "grep -q '\"role\": \"panel\"' /run/firstlook/status.json" >/dev/null || true
   names panel
   guest "ip link set can0 up" || fail "can0 does not come up"
   again 90
