@@ -156,19 +156,22 @@ refused() {
 bad_devices() {
   local out
   say "devices that are there, and not as they must be"
-  guest "systemctl stop firstlook; modprobe vivid && sleep 1" || fail "the kernel's virtual camera cannot be had"
-  refused "a camera with pictures of another size" 's|/dev/video10|/dev/video20|' '320 x 180' 'camera.width'
-  guest "modprobe -r vivid; systemctl stop rig-panel"
+  guest "systemctl stop firstlook rig-panel"
   guest "/usr/lib/rig/rig_panel can0 /usr/lib/rig/firstlook_panel.eds 11 /run/rig/buttons /run/rig/panel >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/panel11.pid; disown"
+  # A module that nobody has configured says its number when it is switched on.
+  guest "(while sleep 1; do printf 'power off\npower on\n' >/run/rig/buttons; done) >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/switch.pid; disown"
   refused "a panel with another number" '' 'node 10 does not answer; node 11 does' 'panel.node_id to 11'
   # The emulator's bus has no bit rates: what a controller says when nobody acknowledges, said for it.
-  guest "kill \$(cat /run/rig/panel11.pid); (while sleep 0.2; do cansend can0 20000004#0020000000000000; done) >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/errors.pid; disown"
+  guest "kill \$(cat /run/rig/switch.pid /run/rig/panel11.pid); (while sleep 0.2; do cansend can0 20000004#0020000000000000; done) >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/errors.pid; disown"
   refused "a bus with another bit rate" '' 'nobody on can0 acknowledges our frames' 'same bit rate'
   guest "kill \$(cat /run/rig/errors.pid); systemctl start rig-panel; touch /run/rig/depth-hangs"
   out=$(guest "firstlook check 2>/dev/null; echo exit \$?")
   guest "rm /run/rig/depth-hangs"
   echo "$out" | grep -q 'depth camera *unsuitable.*repeats one picture' || fail "check should name a depth camera that hangs: $out"
   say "a depth camera that hangs: $(echo "$out" | grep -o 'repeats one picture.*' | head -n 1)"
+  guest "modprobe vivid && sleep 1" || fail "the kernel's virtual camera cannot be had"
+  refused "a camera with pictures of another size" 's|/dev/video10|/dev/video20|' '320 x 180' 'camera.width'
+  guest "modprobe -r vivid"
   guest "systemctl start firstlook --no-block"
   again 90
   expect_light green
