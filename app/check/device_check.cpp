@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "hal/api/repeated_picture.hpp"
+
 namespace firstlook {
 namespace {
 
@@ -30,12 +32,13 @@ void fall_silent(DeviceReport& report, std::string_view what, std::string_view r
   report.remedy.set("{}", remedy);
 }
 
-class WatchedStream final : public WatchedDevice {
+class WatchedStream : public WatchedDevice {
  public:
   WatchedStream(hal::FrameStream& stream, const hal::ReportingDevice* own) : stream_(stream), own_(own) {}
   void poll(Instant now) override {
     const auto frame = stream_.poll(now);
     if (!frame) return;
+    look_at(*frame);
     if (frames_++ == 0) first_ = frame->stamp;
     last_ = frame->stamp;
     latest_ = now;
@@ -65,10 +68,44 @@ class WatchedStream final : public WatchedDevice {
   }
 
  private:
+  virtual void look_at(const hal::Frame&) {}
+
   hal::FrameStream& stream_;
   const hal::ReportingDevice* own_;
   int frames_ = 0;
   Instant first_{}, last_{}, latest_{};
+};
+
+/// Reads a picture now and then, too.
+class WatchedDepth final : public WatchedStream {
+ public:
+  WatchedDepth(hal::DepthCamera& camera, const hal::ReportingDevice* own)
+      : WatchedStream(camera, own), camera_(camera) {}
+  [[nodiscard]] DeviceReport report(Instant now) const override {
+    DeviceReport report = WatchedStream::report(now);
+    if (report.state == DeviceState::kReady && repeats_) {
+      report.state = DeviceState::kUnsuitable;
+      report.detail.set("repeats one picture, with new time stamps");
+      report.remedy.set("{}", fault_row(Fault::kStreamFrozen).remedy);
+    }
+    return report;
+  }
+
+ private:
+  void look_at(const hal::Frame& frame) override {
+    constexpr int kEvery = 4;  // frames: two a second at least from a stream of 10 Hz
+    if (looked_++ % kEvery != 0) return;
+    const CameraIntrinsics& size = camera_.intrinsics();
+    pixels_.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height));
+    if (!camera_.read(frame, {pixels_.data(), size.width, size.height})) return;
+    repeats_ = picture_.repeats(frame.sequence, pixels_);
+  }
+
+  hal::DepthCamera& camera_;
+  std::vector<std::uint16_t> pixels_;
+  hal::RepeatedPicture picture_;
+  int looked_ = 0;
+  bool repeats_ = false;
 };
 
 std::string_view safety_text(hal::ArmSafety safety) {
@@ -173,6 +210,9 @@ class AbsentDevice final : public WatchedDevice {
 
 std::unique_ptr<WatchedDevice> watch_stream(hal::FrameStream& stream, const hal::ReportingDevice* own) {
   return std::make_unique<WatchedStream>(stream, own);
+}
+std::unique_ptr<WatchedDevice> watch_depth(hal::DepthCamera& camera, const hal::ReportingDevice* own) {
+  return std::make_unique<WatchedDepth>(camera, own);
 }
 std::unique_ptr<WatchedDevice> watch_arm(hal::RobotArm& arm, const hal::ReportingDevice* own) {
   return std::make_unique<WatchedArm>(arm, own);

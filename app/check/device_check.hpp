@@ -28,6 +28,8 @@ class WatchedDevice {
 // about its state; what was seen of it is added, and a stream that promised frames and gave none is not ready. Devices
 // must outlive the watch.
 [[nodiscard]] std::unique_ptr<WatchedDevice> watch_stream(hal::FrameStream& stream, const hal::ReportingDevice* own);
+/// The same, and one that sends the same picture again and again is not ready, either.
+[[nodiscard]] std::unique_ptr<WatchedDevice> watch_depth(hal::DepthCamera& camera, const hal::ReportingDevice* own);
 [[nodiscard]] std::unique_ptr<WatchedDevice> watch_arm(hal::RobotArm& arm, const hal::ReportingDevice* own);
 [[nodiscard]] std::unique_ptr<WatchedDevice> watch_pendant(hal::Pendant& pendant, const hal::ReportingDevice* own);
 [[nodiscard]] std::unique_ptr<WatchedDevice> watch_panel(hal::Panel& panel, const hal::ReportingDevice* own);

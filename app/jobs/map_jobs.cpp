@@ -5,7 +5,6 @@
 #include "algorithms/mapping/remaining.hpp"
 #include "algorithms/mapping/self_filter.hpp"
 #include "app/jobs/workbench.hpp"
-#include "platform/journal/journal.hpp"
 
 namespace firstlook {
 namespace {
@@ -60,7 +59,7 @@ std::optional<FrameFlaw> Workbench::insert_frame(const PosedFrame& posed) {
   const double stamp_s = posed.frame.stamp.seconds();
   const double units_per_m = depth_.units_per_m() * alignment_.depth_camera.mount.depth_scale;
   if (const auto flaw = gate_.inspect(pixels, units_per_m, base_T_depth, stamp_s)) return flaw;
-  if (is_frozen(posed.frame)) return FrameFlaw::kFrozen;
+  if (last_picture_.repeats(posed.frame.sequence, depth_pixels_.items())) return FrameFlaw::kFrozen;
   if (pose_sigma_m(posed, frames) > config_.map.pose_sigma_max_m) return FrameFlaw::kPoseUncertain;
 
   const Capsules body = place(camera_body_.capsules, frames);
@@ -112,23 +111,6 @@ double Workbench::pose_sigma_m(const PosedFrame& posed, const LinkFrames& frames
   return sight_sigma_m(
       frames, flange_T_depth * Eigen::Vector3d(0, 0, kPoseRange_m),
       {posed.velocity_rad_s, posed.reports_apart_s, alignment_.depth_stamps.sigma_s, config_.arm.acceleration_rad_s2});
-}
-
-/// A camera that hangs may go on sending the last picture with new stamps. Noise keeps a living one from repeating a
-/// picture, but not from repeating the few pixels that a view into the open returns: those prove nothing.
-bool Workbench::is_frozen(const hal::Frame& frame) {
-  const std::span<const std::uint16_t> pixels = depth_pixels_.items();
-  const std::uint64_t hash = [&] {
-    Fnv1a sum;
-    sum.add(std::as_bytes(pixels));
-    return sum.value();
-  }();
-  constexpr std::ptrdiff_t kTellingShare = 100;  // one pixel of so many: 3072 of 640x480
-  const auto returns = std::count_if(pixels.begin(), pixels.end(), [](std::uint16_t z) { return z != 0; });
-  const bool tells = returns * kTellingShare >= std::ssize(pixels);
-  const bool frozen = tells && last_picture_ && last_picture_->second == hash && last_picture_->first != frame.sequence;
-  last_picture_ = {frame.sequence, hash};
-  return frozen;
 }
 
 /// A look becomes a row of the record; of frames on the way the last one waits to become the row "end".

@@ -35,6 +35,7 @@
 #include "app/report/map_pictures.hpp"
 #include "app/report/run_record.hpp"
 #include "hal/api/cameras.hpp"
+#include "hal/api/repeated_picture.hpp"
 #include "platform/loop/worker_pool.hpp"
 #include "platform/memory/pool_buffer.hpp"
 
@@ -286,7 +287,6 @@ class Workbench {
                                                            const Eigen::MatrixXd& information);
   [[nodiscard]] std::optional<Path> next_turn(const FromHere& here);
   [[nodiscard]] std::optional<FrameFlaw> insert_frame(const PosedFrame& posed);
-  [[nodiscard]] bool is_frozen(const hal::Frame& frame);
   [[nodiscard]] double pose_sigma_m(const PosedFrame& posed, const LinkFrames& frames) const;
   void begin_mapping();
   void rebuild_free_space(double now_s);
@@ -382,7 +382,7 @@ class Workbench {
   std::optional<SweepProgress> sweep_;
   std::vector<std::int8_t> swept_log_odds_;  ///< when the sweep ended
   PublishedSpace published_;
-  std::optional<std::pair<std::uint32_t, std::uint64_t>> last_picture_;  ///< of depth: frame and hash of its pixels
+  hal::RepeatedPicture last_picture_;  ///< of depth
   double last_stamp_s_ = 0;
   bool sweeping_ = true;
   /// The view that was chosen for after a look that is still to come.

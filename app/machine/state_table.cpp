@@ -17,7 +17,7 @@ constexpr std::array kFromBoot = {Transition{"all devices report", kReady}, Tran
 constexpr std::array kFromReady = {Transition{"Play or start button", kLocateBoard},
                                    Transition{"link lost, protective stop, shutdown", kStopped}};
 constexpr std::array kFromRunning = {Transition{"pause", kPaused},
-                                     Transition{"stop, link lost, stale stream", kStopped},
+                                     Transition{"stop, link lost, panel lost, stale stream", kStopped},
                                      Transition{"unexpected event", kFaulted}, Transition{"cannot go on", kPark}};
 constexpr std::array kFromLocate = {Transition{"board seen", kIdentifyLink},
                                     Transition{"board seen, calibration stored", kVerifyCalibration}};
@@ -79,7 +79,7 @@ constexpr std::array kRows = {
     StateRow{kVerifyBoard, kConclude, "VerifyBoard", states::enter_verify_board, nullptr, states::on_verify_board, {}},
     StateRow{kPark, kConclude, "Park", states::enter_park, nullptr, states::on_park, kFromPark},
     StateRow{kReport, kRunning, "Report", states::enter_report, nullptr, states::on_report, kFromReport},
-    StateRow{kPaused, kNone, "Paused", states::enter_paused, nullptr, states::on_paused, kFromPaused},
+    StateRow{kPaused, kNone, "Paused", states::enter_paused, states::exit_paused, states::on_paused, kFromPaused},
     StateRow{kStopped, kNone, "Stopped", states::enter_stopped, nullptr, states::on_ended, {}},
     StateRow{kFaulted, kNone, "Faulted", states::enter_faulted, nullptr, states::on_ended, {}},
 };

@@ -14,6 +14,7 @@
 #include "app/report/done_text.hpp"
 #include "app/report/object_picture.hpp"
 #include "app/shell/event_codec.hpp"
+#include "app/shell/event_worth.hpp"
 #include "app/shell/job_settings.hpp"
 #include "platform/linux/files.hpp"
 #include "platform/linux/process.hpp"
@@ -151,20 +152,7 @@ Status Cart::run() {
 
 // ---- events
 
-/// In Ready the machine remembers of reports and frames no more than the newest report (exit_ready): one that decides
-/// nothing is not needed for a replay, and a service may wait for weeks.
-Worth Cart::worth(const Event& event) const {
-  if (machine_->state() != StateId::kReady) return Worth::kRecord;
-  switch (event.kind) {
-    case ArmReported::kKind:
-      return Worth::kHoldAsBasis;
-    case ColorFrameArrived::kKind:
-    case DepthFrameArrived::kKind:
-      return Worth::kHold;
-    default:
-      return Worth::kRecord;
-  }
-}
+Worth Cart::worth(const Event& event) const { return worth_of(machine_->state(), event.kind); }
 
 void Cart::on_event(const Event& event) {
   const auto machine_event = decode_event(event.kind, event.bytes());

@@ -156,7 +156,7 @@ Status add_kinect(const Config& config, std::vector<DeviceCheck>& checks) {
   if (options->usb.depth) {
     add(kDepthRole, [&] {
       return std::make_unique<Owned>(kinect,
-                                     [](freenect::Kinect& k) { return watch_stream(k.depth(), &k.depth_report()); });
+                                     [](freenect::Kinect& k) { return watch_depth(k.depth(), &k.depth_report()); });
     });
   }
   return {};
@@ -277,7 +277,7 @@ Result<std::vector<DeviceCheck>> real_device_checks(const Config& config) {
     const auto options = depth_options(config.depth);
     if (!options) return std::unexpected(options.error());
     checks.push_back(check_of(kDepthRole, config.depth.device, openni::OpenNiDepth::make(kernel(), *options),
-                              [](openni::OpenNiDepth& camera) { return watch_stream(camera, &camera); }));
+                              [](openni::OpenNiDepth& camera) { return watch_depth(camera, &camera); }));
   }
   if (config.panel.can_interface != "none") {
     checks.push_back(panel_check(config));

@@ -81,7 +81,7 @@ int run_check(const CheckCommand& command) {
   };
   stand_in(kArmRole, watch_arm(world.arm(), nullptr));
   stand_in(kColorRole, watch_stream(world.color(), nullptr));
-  stand_in(kDepthRole, watch_stream(world.depth(), nullptr));
+  stand_in(kDepthRole, watch_depth(world.depth(), nullptr));
   stand_in(kPendantRole, watch_pendant(world.pendant(), nullptr));
   stand_in(kPanelRole, watch_panel(world.panel(), nullptr));
   constexpr std::string_view kOrder[] = {kArmRole, kColorRole, kDepthRole, kPendantRole, kPanelRole, kUsbRole};

@@ -9,7 +9,13 @@
 
 namespace firstlook::hal {
 
-enum class OperatorAction : std::uint8_t { kPlay, kPause, kStop, kConfirm };
+enum class OperatorAction : std::uint8_t {
+  kPlay,
+  kPause,
+  kStop,
+  kConfirm,
+  kLost,  ///< nobody pressed anything: the device is gone, and nobody could hear its stop any more
+};
 
 struct OperatorEvent {
   Instant stamp{};

@@ -51,8 +51,9 @@ void CanPanel::press(Instant stamp, hal::OperatorAction action) {
     return;
   }
   ++events_lost_;
-  // Nobody took sixteen presses. A stop is not the one to be lost.
-  if (action == hal::OperatorAction::kStop) events_.back() = {stamp, action};
+  // Nobody took sixteen presses. What stops is not the one to be lost.
+  const bool stops = action == hal::OperatorAction::kStop || action == hal::OperatorAction::kLost;
+  if (stops) events_.back() = {stamp, action};
 }
 
 void CanPanel::take(const InputReport& report) {
@@ -101,7 +102,7 @@ std::optional<hal::OperatorEvent> CanPanel::poll(Instant now) {
   }
   if (io_.take_loss()) {
     enabling_ = false;
-    press(now, hal::OperatorAction::kStop);
+    press(now, hal::OperatorAction::kLost);
   }
   if (io_.operational()) settle_buttons(now);
   if (events_.empty()) return {};

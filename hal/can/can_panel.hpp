@@ -63,7 +63,7 @@ struct CanPanelOptions {
 
 /// hal::Panel over a RemoteIo. start gives kPlay, stop kStop, confirm kConfirm. A button that is held when the node
 /// comes up counts only after it was released, but for stop, which counts at once and without debouncing. A panel that
-/// is lost counts as its stop button: nobody can hear it any more.
+/// is lost gives kLost once.
 class CanPanel final : public hal::Panel, public hal::ReportingDevice {
  public:
   CanPanel(SystemCalls& system, const CanPanelOptions& options);

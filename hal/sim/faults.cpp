@@ -51,6 +51,7 @@ constexpr std::array kKnobs = {
     Knob{"operator.start_at", Kind::kTime, &Faults::start_s},
     Knob{"operator.pause_at", Kind::kInterval, &Faults::pause_s},
     Knob{"operator.stop_at", Kind::kTime, &Faults::stop_s},
+    Knob{"panel.lost_at", Kind::kTime, &Faults::panel_lost_s},
     Knob{"board.move_at", Kind::kTime, &Faults::board_move_s},
     Knob{"board.number", Kind::kBoard, &Faults::board_number},
     Knob{"board.absent", Kind::kSwitch, nullptr, &Faults::board_absent},

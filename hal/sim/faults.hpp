@@ -33,6 +33,7 @@ struct Faults {
   double pause_s = kNever;            ///< operator.pause_at=T:DURATION, resumed after it
   double pause_duration_s = kNever;
   double stop_s = kNever;         ///< operator.stop_at
+  double panel_lost_s = kNever;   ///< panel.lost_at: the button panel is gone
   double board_move_s = kNever;   ///< board.move_at: slides by 3 cm and turns by 3 degrees
   double board_number = 1;        ///< board.number: which of the boards moves, counted from 1
   bool board_absent = false;      ///< board.absent=1: no board hangs in the cell

@@ -28,6 +28,7 @@ OperatorScript pendant_script(const Faults& faults) {
 OperatorScript panel_script(const Faults& faults) {
   OperatorScript script;
   press(script, faults.start_s, hal::OperatorAction::kPlay);
+  press(script, faults.panel_lost_s, hal::OperatorAction::kLost);
   return script;
 }
 

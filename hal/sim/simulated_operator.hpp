@@ -17,7 +17,7 @@ using OperatorScript = FixedVector<hal::OperatorEvent, 16>;
 
 /// What the script does to the pendant's keys: Play, and the pause or stop that the faults ask for.
 [[nodiscard]] OperatorScript pendant_script(const Faults& faults);
-/// The button on the panel.
+/// The button on the panel, and the end of the panel.
 [[nodiscard]] OperatorScript panel_script(const Faults& faults);
 /// The same keys as the robot's controller feels them, and its mishaps.
 [[nodiscard]] ControllerScript controller_script(const Faults& faults);

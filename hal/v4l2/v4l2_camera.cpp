@@ -13,6 +13,9 @@ constexpr Duration kOldest = milliseconds(2000);  // a stamp further back is of 
 constexpr Duration kLeast = {1000};               // between two stamps
 constexpr int kInputErrorsMax = 10;               // in a row; then the device is opened again
 constexpr int kBuffersPerPoll = 8;
+// When a stream that fell silent is opened again, v4l2loopback hands out the last frame of before, whose feeder may
+// hang. Taken for a new one, it would look like a camera that works, again and again.
+constexpr int kOldFrames = 1;
 
 /// The most that one frame takes: YUYV has 2 bytes a pixel, JPEG of a camera less.
 std::size_t slot_bytes(const CaptureOptions& options) {
@@ -73,6 +76,7 @@ void V4l2Camera::open(Instant now) {
   layout_changed_ = false;
   if (!layout_known_) layout_ = granted;  // not again: jobs may be reading
   layout_known_ = true;
+  passes_over_ = silent_ ? kOldFrames : 0;
   driver_sequence_.reset();
   input_errors_in_a_row_ = 0;
   const double rate_hz = capture_.granted().rate_hz > 0 ? capture_.granted().rate_hz : options_.capture.rate_hz;
@@ -113,7 +117,11 @@ std::optional<hal::Frame> V4l2Camera::poll(Instant now) {
       return newest;
     }
     input_errors_in_a_row_ = 0;
-    if (const auto frame = accept(buffer, now)) newest = frame;
+    if (passes_over_ > 0) {
+      --passes_over_;
+    } else if (const auto frame = accept(buffer, now)) {
+      newest = frame;
+    }
     last_frame_ = now;
     if (!capture_.give_back(buffer)) {
       ++counters_.disconnects;

@@ -94,6 +94,7 @@ class V4l2Camera final : public hal::ColorCamera, public hal::ReportingDevice {
   Duration backoff_{};
   std::optional<std::int64_t> origin_ns_;  ///< of the loop's time on CLOCK_MONOTONIC
   int input_errors_in_a_row_ = 0;
+  int passes_over_ = 0;  ///< frames from before a silence
 };
 
 }  // namespace firstlook::v4l2

@@ -54,6 +54,7 @@ enum class Severity : std::uint8_t { kNotice, kRefusal, kStop, kInternal };
   X(kStreamFrozen,           5011, kStop,     "a camera repeats one picture",         "Restart the camera, check its cable and power, then press start again.") \
   X(kTookTooLong,            5012, kStop,     "the job took longer than three hours", "See in the report which phase took so long.") \
   X(kTouchTestEnded,         5013, kStop,     "the touch test was not carried on", "Lead the tip onto the corner that the pendant names and confirm, within 10 minutes each; at the end bring the arm back into the safe zone.") \
+  X(kPanelLost,              5014, kStop,     "lost the button panel, and with it its stop button", "Check the panel's power, its cable and the CAN bus: `firstlook check` tells which; then press start again.") \
   X(kConfigUnreadable,       6001, kRefusal,  "configuration not readable",           "Correct the file; `firstlook config --defaults` shows every key.") \
   X(kConfigUnknownKey,       6002, kRefusal,  "unknown configuration key",            "Correct the key; `firstlook config --defaults` shows every key.") \
   X(kConfigBadValue,         6003, kRefusal,  "configuration value out of range",     "Correct the value; `firstlook config --defaults` shows the defaults.") \

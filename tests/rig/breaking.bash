@@ -22,9 +22,17 @@ idle() {
     'BEGIN { printf "%.0f", g / h }') times slower here)"
 }
 
+# tells CODE: the service says that fault within seconds; then the arm has stopped.
+tells() {
+  await 15 "journalctl -b -u firstlook -o cat --no-pager --since=@$job_from | grep -q 'E$1 '" >/dev/null ||
+    fail "firstlook should say E$1: $(guest 'journalctl -b -u firstlook -o cat --no-pager -n 8'); $(status_of)"
+  guest "sleep 1" # the arm brakes
+}
+
 # A loop that hangs while the arm moves: the robot brakes by itself, systemd makes a new process, nothing moves.
 hung_loop() {
   local pid before
+  start_job
   before=$(restarts)
   pid=$(main_pid)
   say "the loop hangs (SIGSTOP to the process $pid while the arm moves)"
@@ -115,7 +123,7 @@ real_drivers() {
   say "the conformance suite of the real drivers"
   guest "systemctl stop firstlook; modprobe kvaser_pci && modprobe vivid && sleep 1; for i in can1 can2; do ip link set \$i type can bitrate 125000 restart-ms 100 && ip link set \$i up || exit 1; done" ||
     fail "the emulated CAN controllers do not come up: $(guest 'ip -br link; dmesg | tail -n 5')"
-  guest "/usr/lib/rig/rig_panel can2 /usr/lib/rig/firstlook_panel.eds 10 /run/rig/buttons2 /run/rig/panel2 >/dev/null 2>&1 </dev/null & disown"
+  guest "/usr/lib/rig/rig_panel can2 /usr/lib/rig/firstlook_panel.eds 10 /run/rig/buttons2 /run/rig/panel2 >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/panel2.pid; disown"
   out=$(guest "FIRSTLOOK_RIG_CAMERAS='/dev/video10 320 240 /dev/video20 640 480' FIRSTLOOK_RIG_PANEL='can1 /run/rig/panel2 /run/rig/buttons2' FIRSTLOOK_RIG_RECORDING=/run/rig/cell.oni timeout 200 /usr/lib/rig/rig_conformance") || fail "the real drivers: $out"
   say "the real drivers: $(echo "$out" | tail -n 1)"
   out=$(guest "sed 's|device: openni|device: /run/rig/cell.oni|; s|can_interface: can0|can_interface: can1|' /etc/firstlook/firstlook.yaml >/run/rig/other.yaml; firstlook check --config /run/rig/other.yaml 2>/dev/null" || true)
@@ -123,15 +131,61 @@ real_drivers() {
   echo "$out" | grep -q 'recording' || fail "check should take depth from the recording: $out"
   echo "$out" | grep -q 'can1 node 10.*ready\|ready.*can1 node 10' || fail "check should find the panel on can1: $out"
   say "check: depth from a recording, the panel on can1"
-  guest "kill \$(pgrep -f 'rig_panel can2'); ip link set can1 down; ip link set can2 down; modprobe -r vivid; systemctl start firstlook --no-block"
+  guest "kill \$(cat /run/rig/panel2.pid); ip link set can1 down; ip link set can2 down; modprobe -r vivid; systemctl start firstlook --no-block" ||
+    fail "the second panel or the virtual camera does not go away"
   again 90
 }
 
+# refused WHAT CHANGE TEXT REMEDY: with CHANGE, a script of sed, made to the configuration `check` names the device by
+# TEXT and says REMEDY, and no job begins.
+refused() {
+  local what=$1 out
+  guest "sed '$2' /etc/firstlook/firstlook.yaml >/run/rig/bad.yaml"
+  out=$(guest "firstlook check --config /run/rig/bad.yaml 2>/dev/null; echo exit \$?")
+  echo "$out" | grep -q "$3" || fail "check should name $what ($3): $out"
+  echo "$out" | grep -q "to do: .*$4" || fail "check should say what to do about $what ($4): $out"
+  echo "$out" | grep -q '^exit 4$' || fail "check should exit with 4: $out"
+  out=$(guest "cd /run/rig && timeout 60 firstlook run --config bad.yaml --real-time --out bad-run 2>&1; echo exit \$?")
+  echo "$out" | grep -q '^exit 4$' || fail "no job should begin with $what: $out"
+  echo "$out" | grep -q "$3" || fail "the job should name $what ($3): $out"
+  guest "rm -rf /run/rig/bad-run"
+  say "$what: check and job say $(echo "$out" | grep -o "$3.*" | head -n 1 | cut -c 1-110)"
+}
+
+# Devices that answer and are not what the configuration says.
+bad_devices() {
+  local out
+  say "devices that are there, and not as they must be"
+  guest "systemctl stop firstlook rig-panel"
+  guest "/usr/lib/rig/rig_panel can0 /usr/lib/rig/firstlook_panel.eds 11 /run/rig/buttons /run/rig/panel >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/panel11.pid; disown"
+  # A module that nobody has configured says its number when it is switched on.
+  guest "(while sleep 1; do printf 'power off\npower on\n' >/run/rig/buttons; done) >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/switch.pid; disown"
+  refused "a panel with another number" '' 'node 10 does not answer; node 11 does' 'panel.node_id to 11'
+  # The emulator's bus has no bit rates: what a controller says when nobody acknowledges, said for it.
+  guest "kill \$(cat /run/rig/switch.pid /run/rig/panel11.pid); (while sleep 0.2; do cansend can0 20000004#0020000000000000; done) >/dev/null 2>&1 </dev/null & echo \$! >/run/rig/errors.pid; disown"
+  refused "a bus with another bit rate" '' 'nobody on can0 acknowledges our frames' 'same bit rate'
+  guest "kill \$(cat /run/rig/errors.pid); systemctl start rig-panel; touch /run/rig/depth-hangs"
+  out=$(guest "firstlook check 2>/dev/null; echo exit \$?")
+  guest "rm /run/rig/depth-hangs"
+  echo "$out" | grep -q 'depth camera *unsuitable.*repeats one picture' || fail "check should name a depth camera that hangs: $out"
+  say "a depth camera that hangs: $(echo "$out" | grep -o 'repeats one picture.*' | head -n 1)"
+  guest "modprobe vivid && sleep 1" || fail "the kernel's virtual camera cannot be had"
+  refused "a camera with pictures of another size" 's|/dev/video10|/dev/video20|' '320 x 180' 'camera.width'
+  guest "modprobe -r vivid"
+  guest "systemctl start firstlook --no-block"
+  again 90
+  expect_light green
+}
+
 bus_down_in_motion() {
+  start_job
   say "the panel's bus goes down while the arm moves"
   guest "ip link set can0 down" || fail "can0 does not go down"
-  guest "sleep 2"
+  tells 5014
   stands 3 "nobody could hear the panel's stop button"
+  # The new process gives the panel up after 6 s, then asks every device for as long.
+  await 30 "grep -q '\"role\": \"panel\"' /run/firstlook/status.json" >/dev/null || true
+  names panel
   guest "ip link set can0 up" || fail "can0 does not come up"
   again 90
   expect_light green
@@ -148,20 +202,23 @@ bus_off() {
 }
 
 stop_button() {
+  start_job
   say "the stop button while the arm moves"
   press stop
-  guest "sleep 1"
+  tells 5005
   stands 3 "the stop button was pressed"
   again 90
 }
 
 cameras_gone() {
+  start_job
   say "both cameras stop while the arm moves"
   cameras_stop
-  await 60 "! $(state_is LocateBoard)" >/dev/null || fail "the job goes on without cameras: $(status_of)"
+  tells 5003
   stands 3 "there are no pictures"
   cameras_go_on
   again 120
+  expect_light green
 }
 
 # The faults that the kernel's own virtual camera knows, seen by `firstlook check`.
@@ -229,34 +286,52 @@ break_things() {
   cameras_off_in_ready
   bus_down_in_ready
   bus_off
+  bad_devices
   memory_pressure
   full_disk
-  start_job
   hung_loop
-  start_job
   bus_down_in_motion
-  start_job
   stop_button
-  start_job
   cameras_gone
   say "memory of the service: $(memory_of_service)"
   power_down
 }
 
-# One of the parts above on a computer of its own.
+# Some of the parts above, NAME,NAME..., on a computer of their own.
 part() {
-  declare -F "$1" >/dev/null || fail "there is no part $1; tests/rig/breaking.bash has them"
+  local names name
+  IFS=, read -r -a names <<<"$1"
+  for name in "${names[@]}"; do
+    declare -F "$name" >/dev/null || fail "there is no part $name; tests/rig/breaking.bash has them"
+  done
   image "$2" "part-$2"
   say "power on, kernel $2"
   boot 90
   expect_light green
-  "$1"
+  for name in "${names[@]}"; do "$name"; done
   power_down
 }
 
+# All of it on one kernel.
+whole() {
+  short "$1"
+  break_things "$1"
+}
+
+# One of the emulated computers fills one core: with two cores both kernels go at once, each in a process of its own.
 full() {
-  short std
-  short rt
-  break_things std
-  break_things rt
+  local kind failed="" parts
+  local -A pids
+  for kind in std rt; do disk_of "$kind"; done
+  if [ "$(toolchain/jobs)" -lt 2 ]; then
+    whole std
+    whole rt
+    return
+  fi
+  for kind in std rt; do
+    (set -o pipefail && tests/rig/rig whole "$kind" 2>&1 | sed -u "s/^/$kind /") &
+    pids[$kind]=$!
+  done
+  for kind in std rt; do wait "${pids[$kind]}" || failed+=" $kind"; done
+  [ -z "$failed" ] || fail "not all as it must be:$failed; see above"
 }

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,6 +28,7 @@ namespace firstlook::rig {
 namespace {
 
 constexpr int kRate_hz = 10;
+constexpr const char* kDepthHangsPath = "/run/rig/depth-hangs";  // while it is there, depth repeats one picture
 
 int complain(const char* what, const char* why) {
   std::fprintf(stderr, "rig_cameras: %s: %s\n", what, why);
@@ -66,7 +68,7 @@ float field_of_view_rad(int pixels, double focal_px) {
   return static_cast<float>(2 * std::atan(pixels / (2 * focal_px)));
 }
 
-/// The feed of true joints, with an eye on whether the arm moves.
+/// The feed of true joints, with an eye on whether the arm moves, and whether the robot is there at all.
 class WatchedFeed final : public sim::TrueJointFeed {
  public:
   explicit WatchedFeed(sim::TrueJointFeed& feed) : feed_(feed) {}
@@ -74,6 +76,7 @@ class WatchedFeed final : public sim::TrueJointFeed {
   [[nodiscard]] std::optional<Sample> next() override {
     const auto sample = feed_.next();
     if (sample) {
+      heard_ns_ = monotonic_ns();
       for (int j = 0; j < sample->joints_rad.size(); ++j) {
         if (std::abs(sample->joints_rad[j] - stood_rad_[j]) <= kStands_rad) continue;
         stood_rad_ = sample->joints_rad;
@@ -87,13 +90,35 @@ class WatchedFeed final : public sim::TrueJointFeed {
     feed_.lead(to_rad, speed_rad_s, acceleration_rad_s2);
   }
   [[nodiscard]] std::int64_t moved_ns() const { return moved_ns_; }
+  [[nodiscard]] bool gone() const { return monotonic_ns() - heard_ns_ > kGone_ns; }
 
  private:
   static constexpr double kStands_rad = 1e-6;
+  static constexpr std::int64_t kGone_ns = 1'000'000'000;
   sim::TrueJointFeed& feed_;
   JointVector stood_rad_ = JointVector::zero(kJointsMax);
-  std::int64_t moved_ns_ = monotonic_ns();
+  std::int64_t moved_ns_ = monotonic_ns(), heard_ns_ = moved_ns_;
 };
+
+/// A cell whose arm is the robot's.
+struct Followed {
+  sim::ur::TcpTruth truth;
+  std::optional<WatchedFeed> arm;
+  std::unique_ptr<sim::SimulatedCell> cell;
+};
+
+Result<std::unique_ptr<Followed>> follow(sim::SimulationOptions options) {
+  auto channel = sim::ur::connect_private_channel("127.0.0.1", static_cast<std::uint16_t>(sim::ur::Port::kTruth));
+  if (!channel) return std::unexpected(channel.error());
+  auto followed = std::make_unique<Followed>();
+  if (const Status there = followed->truth.connect(std::move(channel->stream)); !there)
+    return std::unexpected(there.error());
+  options.feed = &followed->arm.emplace(followed->truth);
+  auto cell = sim::make_simulated_cell(options);
+  if (!cell) return std::unexpected(cell.error());
+  followed->cell = std::move(*cell);
+  return followed;
+}
 
 /// What to show. Rendering is what an emulated computer is slowest at: it is done once for each place where the arm
 /// stands, when it has swung out. While it moves the last picture is shown again, which is wrong then (the rig's
@@ -119,25 +144,46 @@ class Freshness {
 /// Feeds the devices, at most kRate_hz times a second each.
 class Feeder {
  public:
-  Feeder(sim::SimulatedCell& cell, const WatchedFeed& arm, int video, DepthWindow& window)
-      : cell_(cell),
-        arm_(arm),
+  Feeder(const CameraIntrinsics& color, const CameraIntrinsics& depth, int video, DepthWindow& window)
+      : color_(color),
+        depth_of_(depth),
         video_(video),
         window_(window),
-        gray_(pixels_of(cell.color().intrinsics())),
-        depth_(pixels_of(cell.depth().intrinsics())),
+        gray_(pixels_of(color)),
+        depth_(pixels_of(depth)),
         yuyv_(2 * gray_.size(), 128) {
-    const CameraIntrinsics& k = cell.depth().intrinsics();
-    window.horizontal_fov_rad = field_of_view_rad(k.width, k.fx);
-    window.vertical_fov_rad = field_of_view_rad(k.height, k.fy);
+    window.horizontal_fov_rad = field_of_view_rad(depth.width, depth.fx);
+    window.vertical_fov_rad = field_of_view_rad(depth.height, depth.fy);
   }
 
-  Status turn(Instant now, std::int64_t clock_start_ns) {
-    if (const auto frame = cell_.color().poll(now)) {
-      if (const Status shown = show_color(*frame); !shown) return shown;
+  /// What the cell shows now; its clock began at `clock_start_ns`.
+  Status turn(Followed& followed, Instant now, std::int64_t clock_start_ns) {
+    sim::SimulatedCell& cell = *followed.cell;
+    if (const auto frame = cell.color().poll(now)) {
+      const Shown shown = color_fresh_.next(followed.arm->moved_ns());
+      if (shown == Shown::kNew) {
+        if (const Status read = cell.color().read(*frame, {gray_.data(), color_.width, color_.height}); !read)
+          return read;
+        for (std::size_t i = 0; i < gray_.size(); ++i) yuyv_[2 * i] = gray_[i];
+      }
+      if (shown != Shown::kNone) {
+        if (const Status given = give_color(); !given) return given;
+      }
     }
-    if (const auto frame = cell_.depth().poll(now)) return show_depth(*frame, clock_start_ns);
+    if (const auto frame = cell.depth().poll(now)) {
+      const Shown shown = depth_fresh_.next(followed.arm->moved_ns());
+      if (shown == Shown::kNew) {
+        if (const Status read = cell.depth().read(*frame, {depth_.data(), depth_of_.width, depth_of_.height}); !read)
+          return read;
+      }
+      if (shown != Shown::kNone) give_depth(frame->stamp.ns + clock_start_ns);
+    }
     return {};
+  }
+  /// The robot is away, and its arm stands: cameras go on.
+  Status again() {
+    give_depth(monotonic_ns());
+    return give_color();
   }
 
  private:
@@ -145,38 +191,23 @@ class Feeder {
     return static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
   }
 
-  Status show_color(const hal::Frame& frame) {
-    const CameraIntrinsics& k = cell_.color().intrinsics();
-    const Shown shown = color_fresh_.next(arm_.moved_ns());
-    if (shown == Shown::kNone) return {};
-    if (shown == Shown::kNew) {
-      if (const Status read = cell_.color().read(frame, {gray_.data(), k.width, k.height}); !read) return read;
-      for (std::size_t i = 0; i < gray_.size(); ++i) yuyv_[2 * i] = gray_[i];
-    }
+  Status give_color() {
     if (write(video_, yuyv_.data(), yuyv_.size()) < 0) return failure(Fault::kDiskWrite, "{}", std::strerror(errno));
     return {};
   }
 
-  Status show_depth(const hal::Frame& frame, std::int64_t clock_start_ns) {
-    const CameraIntrinsics& k = cell_.depth().intrinsics();
-    const Shown shown = depth_fresh_.next(arm_.moved_ns());
-    if (shown == Shown::kNone) return {};
-    if (shown == Shown::kNew) {
-      if (const Status read = cell_.depth().read(frame, {depth_.data(), k.width, k.height}); !read) return read;
-    }
+  void give_depth(std::int64_t stamp_ns) {
     window_.turn.fetch_add(1, std::memory_order_acq_rel);
     std::memcpy(window_.depth_mm, depth_.data(), sizeof window_.depth_mm);
     ++window_.frame;
     // No sensor gives the same picture twice, and firstlook stops at one that does.
     std::uint16_t& pixel = window_.depth_mm[window_.frame % depth_.size()];
-    if (pixel != 0) ++pixel;
-    window_.stamp_us = static_cast<std::uint64_t>((frame.stamp.ns + clock_start_ns) / 1000);
+    if (pixel != 0 && access(kDepthHangsPath, F_OK) != 0) ++pixel;
+    window_.stamp_us = static_cast<std::uint64_t>(stamp_ns / 1000);
     window_.turn.fetch_add(1, std::memory_order_release);
-    return {};
   }
 
-  sim::SimulatedCell& cell_;
-  const WatchedFeed& arm_;
+  CameraIntrinsics color_, depth_of_;
   Freshness color_fresh_, depth_fresh_;
   int video_;
   DepthWindow& window_;
@@ -185,17 +216,32 @@ class Feeder {
   std::vector<std::uint8_t> yuyv_;
 };
 
-int feed(sim::SimulationOptions options, const char* device) {
-  auto channel = sim::ur::connect_private_channel("127.0.0.1", static_cast<std::uint16_t>(sim::ur::Port::kTruth));
-  if (!channel) return complain("the simulated robot", channel.error());
-  sim::ur::TcpTruth truth;
-  if (const Status there = truth.connect(std::move(channel->stream)); !there)
-    return complain("the simulated robot", there.error());
-  WatchedFeed arm(truth);
-  options.feed = &arm;
-  const auto cell = sim::make_simulated_cell(options);
-  if (!cell) return complain("the cell", cell.error());
-  const CameraIntrinsics& color = (*cell)->color().intrinsics();
+/// Until the robot goes, or somebody ends this.
+Status feed_from(Followed& followed, Feeder& feeder) {
+  const std::int64_t clock_start_ns = monotonic_ns();
+  RealClock clock;
+  while (!stop_signal_received() && !followed.arm->gone()) {
+    if (const Status fed = feeder.turn(followed, clock.now(), clock_start_ns); !fed) return fed;
+    clock.sleep_until(clock.now() + milliseconds(1000 / kRate_hz));
+  }
+  return {};
+}
+
+/// Until a robot is there again; null when somebody ended this.
+Result<std::unique_ptr<Followed>> await_robot(const sim::SimulationOptions& options, Feeder& feeder) {
+  RealClock clock;
+  while (!stop_signal_received()) {
+    if (auto followed = follow(options)) return followed;
+    if (const Status fed = feeder.again(); !fed) return std::unexpected(fed.error());
+    clock.sleep_until(clock.now() + milliseconds(1000 / kRate_hz));
+  }
+  return nullptr;
+}
+
+int feed(const sim::SimulationOptions& options, const char* device) {
+  auto followed = follow(options);
+  if (!followed) return complain("the simulated robot", followed.error());
+  const CameraIntrinsics color = (*followed)->cell->color().intrinsics();
   const int video = open_video(device, color.width, color.height);
   if (video < 0) {
     const std::string why = std::strerror(errno);
@@ -203,15 +249,14 @@ int feed(sim::SimulationOptions options, const char* device) {
   }
   DepthWindow* const window = make_window();
   if (window == nullptr) return complain(kDepthWindowPath, std::strerror(errno));
-  Feeder feeder(**cell, arm, video, *window);
+  Feeder feeder(color, (*followed)->cell->depth().intrinsics(), video, *window);
   catch_stop_signals();
-  const std::int64_t clock_start_ns = monotonic_ns();
-  RealClock clock;
-  while (!stop_signal_received()) {
-    if (const Status fed = feeder.turn(clock.now(), clock_start_ns); !fed) return complain("a frame", fed.error());
-    clock.sleep_until(clock.now() + milliseconds(1000 / kRate_hz));
+  while (followed && *followed) {
+    if (const Status fed = feed_from(**followed, feeder); !fed) return complain("a frame", fed.error());
+    followed->reset();
+    followed = await_robot(options, feeder);
   }
-  return 0;
+  return followed ? 0 : complain("a frame", followed.error());
 }
 
 void print_info(const char* name, const CameraIntrinsics& k) {

@@ -16,6 +16,7 @@ machine() {
   rm -rf "$run"
   mkdir -p "$run"
   console=$logs/$name-console.log
+  emulator_log=$logs/$name-emulator.log
   : >"$console"
   mkfifo "$run/line.in" "$run/line.out"
   qemu-img create -q -f qcow2 -F raw -b "$4" "$run/disk.qcow2"
@@ -33,7 +34,7 @@ power_on() {
     -drive "file=$run/disk.qcow2,if=virtio,format=qcow2,cache=writeback" -device virtio-rng-pci \
     -object can-bus,id=cable -device kvaser_pci,canbus=cable -device kvaser_pci,canbus=cable \
     -chardev "file,id=console,path=$console,append=on" -serial chardev:console \
-    -chardev "pipe,id=line,path=$run/line" -serial chardev:line </dev/null >"$logs/emulator.log" 2>&1 &
+    -chardev "pipe,id=line,path=$run/line" -serial chardev:line </dev/null >"$emulator_log" 2>&1 &
   emulator=$!
   exec {to_guest}<>"$run/line.in" {from_guest}<>"$run/line.out"
 }
@@ -73,7 +74,7 @@ trap 'if is_on; then kill -9 "$emulator"; fi; rm -rf "$run"' EXIT
 
 guest() {
   local mine=${EPOCHREALTIME/./} line
-  is_on || fail "the emulator has ended; see $logs/emulator.log and $console"
+  is_on || fail "the emulator has ended; see $emulator_log and $console"
   printf '%s %s\n' "$mine" "$1" >&"$to_guest"
   while IFS= read -r -t "${guest_patience_s:-1500}" -u "$from_guest" line; do
     line=${line%$'\r'}

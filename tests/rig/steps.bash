@@ -3,17 +3,24 @@
 
 deb_of_tree() { find build -maxdepth 1 -name 'firstlook_*.deb' | head -n 1; }
 
-# image KIND NAME: the emulated computer with the disk of KIND.
-image() {
-  local deb parts
+# disk_of KIND: its kernel, initrd and disk, in `parts`.
+disk_of() {
+  local deb
   deb=$(deb_of_tree)
   [ -n "$deb" ] || fail "no build/firstlook_*.deb: make deb"
   say "image $1 (parts that are there are taken as they are)"
   mapfile -t parts < <(tests/rig/guest-image "$1" "$deb")
   [ ${#parts[@]} = 3 ] || fail "no image $1; see above"
+}
+
+# image KIND NAME: the emulated computer with the disk of KIND.
+image() {
+  local parts
+  disk_of "$1"
   machine "$2" "${parts[@]}"
 }
 
+job_from=0
 state_is() { echo "grep -q '\"state\": \"$1\"' /run/firstlook/status.json"; }
 status_of() { guest "cat /run/firstlook/status.json"; }
 
@@ -48,7 +55,7 @@ expect_light() {
 # stands SECONDS WHY
 stands() {
   local moved
-  if moved=$(guest "/usr/lib/rig/await-motion $1"); then fail "the robot $moved, $2"; fi
+  if moved=$(guest "/usr/lib/rig/rig_await_motion $1"); then fail "the robot $moved, $2"; fi
   [ "$moved" = stood ] || fail "nobody could ask the robot where it stands: $moved"
   say "the robot stands, $2 ($1 s)"
 }
@@ -59,12 +66,13 @@ press() { guest "echo press $1 >/run/rig/buttons; sleep 0.5; echo release $1 >/r
 # Play, then the panel's start button: the robot must begin to move.
 start_job() {
   local before moved
+  job_from=$(guest "date +%s") # what the journal says from here on is of this job
   play
   await 30 "grep -q 'press the start button' /run/firstlook/status.json" >/dev/null ||
     fail "after Play firstlook should ask for the start button; it says: $(status_of)"
   before=$(guest "cut -d ' ' -f 1 /proc/uptime")
   press start
-  moved=$(guest "/usr/lib/rig/await-motion 60") || fail "the button was pressed and nothing moved: $(status_of)"
+  moved=$(guest "/usr/lib/rig/rig_await_motion 60") || fail "the button was pressed and nothing moved: $(status_of)"
   say "the button's press became motion: $(echo "$before ${moved##* }" | awk '{ printf "%.1f", $2 - $1 }') s (guest time)"
 }
 

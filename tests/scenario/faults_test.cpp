@@ -74,6 +74,9 @@ void check_stop(const Json& result, double at_s) {
 
 TEST_CASE("a person, the robot or the network stops the job at once", "[scenario]") {
   check_stop(run_with("operator.stop_at=20", stopped("E5005")), 20);
+  const Json deaf = run_with("panel.lost_at=20", stopped("E5014 lost the button panel"));
+  check_stop(deaf, 20);
+  CHECK_THAT(deaf["remedy"].get<std::string>(), Catch::Contains("CAN bus") && Catch::Contains("firstlook check"));
   check_stop(run_with("arm.protective_stop_at=20", stopped("E5004")), 20);
   check_stop(run_with("arm.emergency_stop_at=20", stopped("E5004")), 20);
   check_stop(run_with("arm.emergency_stop_at=0.2", stopped("E5004")), 0.2);
@@ -98,6 +101,27 @@ TEST_CASE("a pause is waited for, but not for ever", "[scenario]") {
   CHECK(phase_start_s(resumed, "Paused") == Approx(20).margin(0.1));
   const Json given_up = run_with("operator.pause_at=20", stopped("E5009"));
   CHECK(given_up["safety"]["stops"][0]["time_s"].get<double>() == Approx(3620).margin(1));
+}
+
+TEST_CASE("a pause of an hour is as short in the journal as one of seconds, and replays", "[scenario]") {
+  const JobFolder folder;
+  folder.write("short.yaml", "explore: {views_max: 3}\n");
+  const auto journal_bytes = [&](const std::string& faults, int exit_code) {
+    const ProgramResult run = folder.run_job(faults, {"--config", "short.yaml", "--faults", faults});
+    INFO(run.err);
+    CHECK(run.exit_code == exit_code);
+    const ProgramResult replayed = folder.run({"replay", faults + "/journal.flj"});
+    INFO(replayed.err);
+    CHECK(replayed.exit_code == 0);
+    CHECK(replayed.out.find("stopped at its cap") == std::string::npos);
+    check_safe(folder.read_json(faults + "/result.json"));
+    return std::filesystem::file_size(folder / (faults + "/journal.flj"));
+  };
+  const std::string calibrating = "operator.pause_at=20", mapping = in_mapping("operator.pause_at", 10);
+  const auto seconds = journal_bytes(calibrating + ":5", 0);
+  CHECK(journal_bytes(calibrating + ":3590", 0) < seconds + seconds / 10);
+  CHECK(journal_bytes(calibrating, 6) < seconds);
+  CHECK(journal_bytes(mapping + ":3590", 0) < seconds + seconds / 4);  // what was known free is looked at again
 }
 
 TEST_CASE("after a long pause the surroundings are looked at again", "[scenario]") {

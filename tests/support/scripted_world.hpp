@@ -114,8 +114,10 @@ class ScriptedWorld : public DecisionSink {
   Ending ending;
   Instant now{};
 
+  /// Whatever comes to the machine comes this way; a world that records notes it before.
+  virtual void happen(const MachineEvent& event) { machine.on_event(now, event); }
   void press(hal::OperatorAction action, OperatorDevice device = OperatorDevice::kPendant) {
-    machine.on_event(now, OperatorActed{device, action});
+    happen(OperatorActed{device, action});
   }
   /// A person leads the arm by hand, half a radian a second.
   void lead(int joint, double by_rad) {
@@ -163,10 +165,10 @@ class ScriptedWorld : public DecisionSink {
       return;
     }
     move_on();
-    if (arm_reports) machine.on_event(now, report());
-    if (++ticks_ % 8 == 0) machine.on_event(now, ColorFrameArrived{{now - frame_age, ++frames_, frames_ % 32}});
+    if (arm_reports) happen(report());
+    if (++ticks_ % 8 == 0) happen(ColorFrameArrived{{now - frame_age, ++frames_, frames_ % 32}});
     if (ticks_ % 4 == 0 && depth_frames) {
-      machine.on_event(now, DepthFrameArrived{{now - frame_age, ++frames_, frames_ % 32}});
+      happen(DepthFrameArrived{{now - frame_age, ++frames_, frames_ % 32}});
     }
     answer_jobs();
     fire_timers();
@@ -322,13 +324,13 @@ class ScriptedWorld : public DecisionSink {
       const Job job = jobs_.front();
       jobs_.pop_front();
       if (failing == job.kind) {
-        machine.on_event(now, JobCompleted{job.kind, job.number, {}, Fault::kOutOfMemory});
+        happen(JobCompleted{job.kind, job.number, {}, Fault::kOutOfMemory});
         continue;
       }
       if (job.kind == JobKind::kForgetKnownFree) continue;  // the shell's own
       if (job.kind == JobKind::kPlan) ++plans_[arguments_of<PlanArguments>(job.arguments).phase];
       const std::size_t size = pack_answer(job.kind, job.arguments, bytes);
-      machine.on_event(now, JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size), {}});
+      happen(JobCompleted{job.kind, job.number, std::span<const std::byte>(bytes.data(), size), {}});
     }
   }
   void fire_timers() {
@@ -338,11 +340,11 @@ class ScriptedWorld : public DecisionSink {
     }
     for (const MachineTimer timer : due) {
       timers_.erase(timer);
-      machine.on_event(now, TimerFired{timer});
+      happen(TimerFired{timer});
     }
     if (machine_refusal_) {
       machine_refusal_ = false;
-      machine.on_event(now, CommandRefused{Fault::kProgramStopped});
+      happen(CommandRefused{Fault::kProgramStopped});
     }
   }
 

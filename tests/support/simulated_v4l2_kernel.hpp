@@ -43,10 +43,11 @@ class SimulatedV4l2Kernel final : public SystemCalls {
 
   // What goes wrong.
   bool present = true, stalled = false;
-  std::set<std::uint32_t> lost;         ///< frames that the driver never fills a buffer with, by number
-  std::set<std::uint32_t> broken;       ///< frames flagged as errors
-  std::set<std::uint32_t> cut;          ///< frames of half the bytes
-  int input_errors = 0;                 ///< so many DQBUF give EIO
+  bool keeps_last = false;         ///< whoever begins to stream gets a frame of before at once, as v4l2loopback does
+  std::set<std::uint32_t> lost;    ///< frames that the driver never fills a buffer with, by number
+  std::set<std::uint32_t> broken;  ///< frames flagged as errors
+  std::set<std::uint32_t> cut;     ///< frames of half the bytes
+  int input_errors = 0;            ///< so many DQBUF give EIO
   std::map<unsigned long, int> refuse;  ///< an errno for each request
   int open_error = 0;
   // With an own thread above it: the computer's time in place of set_now(), and an opening that takes its time.
@@ -146,6 +147,7 @@ class SimulatedV4l2Kernel final : public SystemCalls {
         next_ = 0;
         begin_ = now_;
         filled_.clear();
+        if (keeps_last) fill(next_++);
         return 0;
       case VIDIOC_STREAMOFF:
         streaming_ = false;
@@ -189,14 +191,16 @@ class SimulatedV4l2Kernel final : public SystemCalls {
   void advance() {
     while (streaming_ && !stalled && stamp(next_) + transfer <= now_) {
       const std::uint32_t number = next_++;
-      if (lost.contains(number) || queued_.empty()) continue;
-      const std::uint32_t index = queued_.front();
-      queued_.pop_front();
-      std::vector<std::uint8_t> bytes = picture(number);
-      if (cut.contains(number)) bytes.resize(bytes.size() / 2);
-      std::ranges::copy(bytes, memory_.at(index).begin());
-      filled_.push_back({index, number, static_cast<std::uint32_t>(bytes.size())});
+      if (!lost.contains(number) && !queued_.empty()) fill(number);
     }
+  }
+  void fill(std::uint32_t number) {
+    const std::uint32_t index = queued_.front();
+    queued_.pop_front();
+    std::vector<std::uint8_t> bytes = picture(number);
+    if (cut.contains(number)) bytes.resize(bytes.size() / 2);
+    std::ranges::copy(bytes, memory_.at(index).begin());
+    filled_.push_back({index, number, static_cast<std::uint32_t>(bytes.size())});
   }
   int dequeue(v4l2_buffer& b) {
     if (!streaming_) return -EINVAL;

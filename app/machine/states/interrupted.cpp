@@ -19,6 +19,9 @@ void enter_paused(Machine& m) {
   m.set_timer(MachineTimer::kState, kPauseMax_s);
 }
 
+/// What came in the pause is of no use to what follows, as in Ready: so a journal need not tell it (worth_of).
+void exit_paused(Machine& m) { m.forget_the_past(); }
+
 Handled on_paused(Machine& m, const MachineEvent& event) {
   Progress& p = m.progress();
   if (const auto* report = std::get_if<ArmReported>(&event)) {
@@ -31,10 +34,7 @@ Handled on_paused(Machine& m, const MachineEvent& event) {
     }
     return Handled::kYes;
   }
-  if (const auto* key = std::get_if<OperatorActed>(&event)) {
-    if (key->action == hal::OperatorAction::kStop) m.stop_for(Fault::kProgramStopped);
-    return Handled::kYes;
-  }
+  if (heed_stop(m, event) || std::holds_alternative<OperatorActed>(event)) return Handled::kYes;
   if (const auto* timer = std::get_if<TimerFired>(&event); timer && timer->timer == MachineTimer::kState) {
     m.stop_for(Fault::kPausedTooLong);
     return Handled::kYes;

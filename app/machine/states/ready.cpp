@@ -43,7 +43,7 @@ void enter_ready(Machine& m) {
   tell_ready(m);
 }
 
-/// What came while it waited is of no use to the job: so a journal need not tell it (Cart::worth).
+/// What came while it waited is of no use to the job: so a journal need not tell it (worth_of).
 void exit_ready(Machine& m) { m.forget_the_past(); }
 
 Handled on_ready(Machine& m, const MachineEvent& event) {

@@ -24,8 +24,8 @@ Handled on_running(Machine& m, const MachineEvent& event) {
     }
     return Handled::kYes;
   }
+  if (heed_stop(m, event)) return Handled::kYes;
   if (const auto* key = std::get_if<OperatorActed>(&event)) {
-    if (key->action == hal::OperatorAction::kStop) m.stop_for(Fault::kProgramStopped);
     if (key->action == hal::OperatorAction::kPause) pause(m);
     return Handled::kYes;
   }
@@ -35,6 +35,18 @@ Handled on_running(Machine& m, const MachineEvent& event) {
   }
   // A refusal that comes after its trip was withdrawn.
   return std::holds_alternative<CommandRefused>(event) ? Handled::kYes : Handled::kNo;
+}
+
+bool heed_stop(Machine& m, const MachineEvent& event) {
+  const auto* key = std::get_if<OperatorActed>(&event);
+  const auto* changed = std::get_if<DeviceChanged>(&event);
+  const bool stop = key != nullptr && key->action == hal::OperatorAction::kStop;
+  // The second tells of a panel that went just before the job began.
+  const bool lost = (key != nullptr && key->action == hal::OperatorAction::kLost) ||
+                    (changed != nullptr && changed->device == CartDevice::kPanel && !changed->present);
+  if (stop) m.stop_for(Fault::kProgramStopped);
+  if (lost) m.stop_for(Fault::kPanelLost);
+  return stop || lost;
 }
 
 bool may_move(hal::ArmSafety safety) { return safety == hal::ArmSafety::kNormal || safety == hal::ArmSafety::kReduced; }

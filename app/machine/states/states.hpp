@@ -44,6 +44,7 @@ Handled on_park(Machine& m, const MachineEvent& event);
 void enter_report(Machine& m);
 Handled on_report(Machine& m, const MachineEvent& event);
 void enter_paused(Machine& m);
+void exit_paused(Machine& m);
 Handled on_paused(Machine& m, const MachineEvent& event);
 void enter_stopped(Machine& m);
 void enter_faulted(Machine& m);
@@ -51,6 +52,8 @@ Handled on_ended(Machine& m, const MachineEvent& event);
 
 /// False from a protective or emergency stop until a person has cleared it.
 [[nodiscard]] bool may_move(hal::ArmSafety safety);
+/// Stops the job when a person asks for it, or when the panel is gone and nobody could hear them ask. True when it did.
+[[nodiscard]] bool heed_stop(Machine& m, const MachineEvent& event);
 /// Remembers from where targets were seen for the first time.
 void note_targets(Machine& m, TargetMask seen);
 /// Asks for a path from here to `target`.

@@ -6,6 +6,7 @@
 
 #include "app/check/check_report.hpp"
 #include "tests/support/mock_color_camera.hpp"
+#include "tests/support/mock_depth_camera.hpp"
 #include "tests/support/mock_panel.hpp"
 #include "tests/support/mock_pendant.hpp"
 #include "tests/support/mock_robot_arm.hpp"
@@ -89,6 +90,34 @@ TEST_CASE("a stream without frames, and an arm without reports or in a stop, are
     CHECK(result.devices[0].report.state == DeviceState::kUnsuitable);
     CHECK_THAT(std::string(result.devices[0].report.detail.view()), Contains("protective stop"));
     CHECK_FALSE(result.devices[0].report.remedy.empty());
+  }
+}
+
+TEST_CASE("a depth camera that repeats its picture is not ready, one that sees little may", "[check]") {
+  mock::MockDepthCamera camera;
+  bool hangs = false;
+  std::size_t returns = 64 * 48;
+  camera.paint = [&](const hal::Frame& frame, ImageView<std::uint16_t> image) {
+    std::ranges::fill(image.pixels(), std::uint16_t{0});
+    std::ranges::fill(image.pixels().first(returns), std::uint16_t{1500});
+    if (!hangs) ++image.at(static_cast<int>(frame.sequence % 64), 0);
+  };
+  VirtualClock clock;
+  const auto checked = [&] {
+    return watch_devices(only("depth camera", watch_depth(camera, nullptr)), clock).front().report;
+  };
+  SECTION("it lives") { CHECK(checked().state == DeviceState::kReady); }
+  SECTION("it hangs") {
+    hangs = true;
+    const hal::DeviceReport report = checked();
+    CHECK(report.state == DeviceState::kUnsuitable);
+    CHECK_THAT(std::string(report.detail.view()), Contains("repeats one picture"));
+    CHECK_THAT(std::string(report.remedy.view()), Contains("Restart the camera"));
+  }
+  SECTION("it looks into the open") {
+    hangs = true;
+    returns = 20;
+    CHECK(checked().state == DeviceState::kReady);
   }
 }
 

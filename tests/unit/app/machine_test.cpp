@@ -361,6 +361,14 @@ TEST_CASE("every stop ends motion at once and needs a person", "[machine]") {
     expected = Fault::kProgramStopped;
     world.press(OperatorAction::kStop);
   }
+  SECTION("the panel is lost") {
+    expected = Fault::kPanelLost;
+    world.press(OperatorAction::kLost, OperatorDevice::kPanel);
+  }
+  SECTION("the panel was lost before the job began, and is told of now") {
+    expected = Fault::kPanelLost;
+    world.machine.on_event(world.now, DeviceChanged{CartDevice::kPanel, false});
+  }
   SECTION("protective stop") {
     expected = Fault::kProtectiveStop;
     world.safety = hal::ArmSafety::kProtectiveStop;
@@ -403,6 +411,11 @@ TEST_CASE("a paused arm that falls silent, and a pause that never ends", "[machi
     world.arm_reports = false;
     REQUIRE(world.run_to_end(0.3));
     CHECK(world.ending.fault == Fault::kLinkLost);
+  }
+  SECTION("no panel that could hear a stop") {
+    world.press(OperatorAction::kLost, OperatorDevice::kPanel);
+    REQUIRE(world.ended);
+    CHECK(world.ending.fault == Fault::kPanelLost);
   }
   SECTION("an hour") {
     REQUIRE(world.run_to_end(3601));

@@ -228,7 +228,7 @@ TEST_CASE("a module that falls silent is lost within half a second, and comes ba
   CHECK(rig.state() == DeviceState::kLost);
   CHECK(rig.detail().find("no heartbeat came any more") != std::string::npos);
   CHECK(rig.remedy().find("power") != std::string::npos);
-  CHECK(rig.taken() == Actions{OperatorAction::kStop});  // nobody can hear its stop button
+  CHECK(rig.taken() == Actions{OperatorAction::kLost});  // nobody pressed anything
   CHECK(rig.number("losses") == 1);
   rig.run(20);
   CHECK(rig.state() == DeviceState::kLost);
@@ -250,7 +250,7 @@ TEST_CASE("a cable that is broken and mended behind a running module", "[can][pa
   rig.node.mute = false;
   rig.run(4);
   CHECK(rig.state() == DeviceState::kReady);
-  CHECK(rig.taken() == Actions{OperatorAction::kStop});
+  CHECK(rig.taken() == Actions{OperatorAction::kLost});
 }
 
 TEST_CASE("a module that restarts, or leaves its state, is configured again and its presses are not invented",
@@ -269,7 +269,7 @@ TEST_CASE("a module that restarts, or leaves its state, is configured again and 
   CHECK(rig.state() == DeviceState::kReady);
   CHECK(rig.number("losses") == 1);
   CHECK(rig.node.value({0x1017, 0}) == 100);
-  CHECK(rig.taken() == Actions{OperatorAction::kStop});
+  CHECK(rig.taken() == Actions{OperatorAction::kLost});
 }
 
 TEST_CASE("an interface that goes down or away is told, counted, and used again", "[can][panel]") {
@@ -291,7 +291,7 @@ TEST_CASE("an interface that goes down or away is told, counted, and used again"
   CHECK(rig.number("interface_losses") == 1);
   CHECK(rig.number("losses") == 1);
   CHECK(rig.kernel.open_sockets() == 0);
-  CHECK(rig.taken() == Actions{OperatorAction::kStop});
+  CHECK(rig.taken() == Actions{OperatorAction::kLost});
   rig.run(2.5);
   CHECK(rig.state() == DeviceState::kReady);
   CHECK(rig.kernel.open_sockets() == 1);
@@ -331,7 +331,7 @@ TEST_CASE("bus-off is told, and survived when the controller restarts", "[can][p
   }
   SECTION("untold") { rig.run(4); }
   CHECK(rig.state() == DeviceState::kReady);
-  CHECK(rig.taken() == Actions{OperatorAction::kStop});
+  CHECK(rig.taken() == Actions{OperatorAction::kLost});
 }
 
 TEST_CASE("a silent bus tells the bit rate from a wrong number", "[can][panel]") {
@@ -526,7 +526,7 @@ TEST_CASE("other wiring: a stop that closes, lamps elsewhere", "[can][panel]") {
   CHECK(rig.node.lamps() == 0);
 }
 
-TEST_CASE("whatever frames come, the panel goes on and presses nothing by itself but stop", "[can][panel]") {
+TEST_CASE("whatever frames come, the panel goes on and presses nothing by itself", "[can][panel]") {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Rig rig;
     rig.run(1);
@@ -541,7 +541,7 @@ TEST_CASE("whatever frames come, the panel goes on and presses nothing by itself
       if ((frame.can_id & 0x7FF) != 0x18A) rig.kernel.deliver(frame);
       rig.run(0.002);
     }
-    for (const OperatorAction action : rig.taken()) CHECK(action == OperatorAction::kStop);
+    for (const OperatorAction action : rig.taken()) CHECK(action == OperatorAction::kLost);
     rig.run(10);
     INFO(seed << ": " << rig.detail());
     CHECK(rig.state() == DeviceState::kReady);

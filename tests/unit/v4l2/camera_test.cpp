@@ -326,6 +326,27 @@ TEST_CASE("a stream that stops without a word is found by our own clock", "[v4l2
   CHECK(rig.state() == DeviceState::kReady);
 }
 
+TEST_CASE("a feeder that hangs behind a loopback stays lost, although each opening brings its last frame again",
+          "[v4l2][camera]") {
+  Rig rig;
+  rig.run(1);
+  rig.kernel.stalled = true;
+  rig.kernel.keeps_last = true;
+  rig.run(1.2);
+  CHECK(rig.state() == DeviceState::kLost);
+  rig.frames.clear();
+  for (int i = 0; i < 100; ++i) {
+    rig.run(0.2);
+    CHECK(rig.state() == DeviceState::kLost);
+  }
+  CHECK(rig.frames.empty());
+  CHECK(rig.kernel.opens() > 2);
+  rig.kernel.stalled = false;
+  rig.run(10);
+  CHECK(rig.state() == DeviceState::kReady);
+  CHECK_FALSE(rig.frames.empty());
+}
+
 TEST_CASE("a disturbed signal is survived; one that stays is opened again", "[v4l2][camera]") {
   Rig rig;
   rig.run(1);
