@@ -202,7 +202,7 @@ struct Config {
     int views_max = 150;
     int candidates = 400;
     int certificate_samples = 1000;
-    int cluster_voxels_min = 16;
+    int cluster_voxels_min = 12;
     double frames_while_moving_hz = 2;
     std::string views = "firstlook";  ///< firstlook | thesis2014
     bool operator==(const Explore&) const = default;
