@@ -83,7 +83,8 @@ struct HandEyeResult {
   std::vector<std::optional<double>> holdout_px;
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons;  ///< why rejected; empty when accepted
-  /// Rejected for one view, the last: more views would tell whether it is wrong by itself or something has moved.
+  /// The one view that contradicts the others is the last, and that rejects: more views would tell whether it is wrong
+  /// by itself or something has moved.
   bool only_last_contradicts = false;
   /// What people most likely did wrong; also the last of the reasons when rejected. Of an accepted calibration: what is
   /// wrong with the views that were left out. Empty when nothing was found.

@@ -78,9 +78,12 @@ PlanResult Workbench::certify_path(const PlanArguments& arguments) {
     return result;
   }
   rebuild_free_space(arguments.now_s);
-  if (arguments.foreseen && foreseen_) clearance_in_force_ = foreseen_->pace.in_force;
+  if (arguments.foreseen) {
+    if (!foreseen_) return result;  // nothing says which clearance its speed needs
+    clearance_in_force_ = foreseen_->pace.in_force;
+  }
   result.found = route_is_certified(arguments.from_rad, arguments.path, &result.margin_m);
-  if (arguments.foreseen && foreseen_ && result.found) {
+  if (arguments.foreseen && result.found) {
     take_choice(foreseen_->path, foreseen_->gain.unknown, foreseen_->pace);
     chooser_.adopt(foreseen_->gain, unknown_before_, gain_min());
   }
@@ -214,8 +217,9 @@ NextViewResult Workbench::next_view(const FromHere& here) {
   rebuild_free_space(here.now_s);
   sweeping_ = false;
   foreseen_.reset();
-  if (!here.after_look) expected_gain_ = 0;
   NextViewResult result;
+  if (here.after_look && config_.explore.views == "thesis2014") return result;  // nothing was chosen on the way there
+  if (!here.after_look) expected_gain_ = 0;
   const auto paces = mapping_paces();
   for (std::size_t i = 0; i < paces.size(); ++i) {
     result = explore_at(paces[i], here);

@@ -260,7 +260,7 @@ void Cart::submit(JobKind kind, std::uint32_t number, std::span<const std::byte>
   request_.virtual_duration = virtual_duration(kind);
   request_.size = static_cast<std::uint32_t>(arguments.size());
   std::copy(arguments.begin(), arguments.end(), request_.arguments.begin());
-  // The machine waits for two jobs at most, but in real time those that a pause left behind may still run.
+  // The machine has few jobs at a time, but in real time those that a pause left behind may still run.
   if (!runner_->submit(request_, now)) host_.ask_shutdown(Fault::kQueueFull);
 }
 

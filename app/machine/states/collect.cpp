@@ -32,17 +32,6 @@ void go(Machine& m) {
     m.foresee(JobKind::kNextCalibrationView);
 }
 
-/// Where the view was chosen on the way here the arm stands a little beside the place that it was chosen for.
-void certify_from_here(Machine& m) {
-  PlanArguments plan;
-  plan.from_rad = m.arm().position_rad;
-  plan.phase = MotionPhase::kBeforeCalibration;
-  plan.now_s = m.now().seconds();
-  plan.path = m.progress().aiming.path;
-  if (!plan.path.empty()) plan.to_rad = plan.path.back().target_rad;
-  m.start_job(JobKind::kCertifyPath, plan);
-}
-
 void take(Machine& m, const CalibrationViewResult& choice, bool foreseen) {
   Progress& p = m.progress();
   const bool enough = p.observations >= static_cast<std::uint32_t>(m.settings().calibration_views_min);
@@ -51,7 +40,8 @@ void take(Machine& m, const CalibrationViewResult& choice, bool foreseen) {
   } else if (choice.found) {
     p.aiming = choice;
     if (foreseen) {
-      certify_from_here(m);
+      // The arm stands a little beside the place that it was chosen for.
+      certify_from_here(m, p.aiming.path, MotionPhase::kBeforeCalibration, false);
     } else {
       go(m);
     }

@@ -40,14 +40,7 @@ Handled on_choose(Machine& m, const MachineEvent& event) {
 }
 
 void enter_plan(Machine& m) {
-  PlanArguments plan;
-  plan.from_rad = m.arm().position_rad;
-  plan.phase = MotionPhase::kMapping;
-  plan.now_s = m.now().seconds();
-  plan.path = m.progress().chosen.path;
-  if (!plan.path.empty()) plan.to_rad = plan.path.back().target_rad;
-  plan.foreseen = m.progress().chosen_ahead;
-  m.start_job(JobKind::kCertifyPath, plan);
+  certify_from_here(m, m.progress().chosen.path, MotionPhase::kMapping, m.progress().chosen_ahead);
 }
 
 Handled on_plan(Machine& m, const MachineEvent& event) {

@@ -70,4 +70,15 @@ void plan_to(Machine& m, const JointVector& target, MotionPhase phase) {
   m.start_job(JobKind::kPlan, plan);
 }
 
+void certify_from_here(Machine& m, const Route& path, MotionPhase phase, bool foreseen) {
+  PlanArguments plan;
+  plan.from_rad = m.arm().position_rad;
+  plan.phase = phase;
+  plan.now_s = m.now().seconds();
+  plan.path = path;
+  if (!plan.path.empty()) plan.to_rad = plan.path.back().target_rad;
+  plan.foreseen = foreseen;
+  m.start_job(JobKind::kCertifyPath, plan);
+}
+
 }  // namespace firstlook::states

@@ -58,6 +58,8 @@ Handled on_ended(Machine& m, const MachineEvent& event);
 void note_targets(Machine& m, TargetMask seen);
 /// Asks for a path from here to `target`.
 void plan_to(Machine& m, const JointVector& target, MotionPhase phase);
+/// Asks whether a path that was chosen before holds from where the arm is now. `foreseen`: PlanArguments::foreseen.
+void certify_from_here(Machine& m, const Route& path, MotionPhase phase, bool foreseen);
 /// The body and space that motions are certified for now.
 [[nodiscard]] MotionPhase phase_of(Machine& m);
 /// The job is to use a calibration from elsewhere, which says that the camera is on the flange.

@@ -36,6 +36,15 @@ void look_and_remember(SmallWorld& world, ViewChooser& chooser, const Path& path
   chooser.remember_look(world.context(), world.q);
 }
 
+/// What it knows then is enough to move in.
+void look_from_two_places(SmallWorld& world) {
+  world.look(world.q);
+  JointVector beside = world.q;
+  beside[0] += 0.2;
+  world.look(beside);
+  world.update();
+}
+
 void sweep(SmallWorld& world, ViewChooser& chooser) {
   SweepProgress progress = plan_sweep(world.arm, world.q, 0.99);
   world.look(world.q);
@@ -94,11 +103,7 @@ TEST_CASE("one seed gives one choice, with one worker and with two", "[explore]"
   SmallWorld world(room_with_wall());
   ViewChooser one(world.map.geometry(), world.sensor, 200, 1);
   ViewChooser two(world.map.geometry(), world.sensor, 200, 2);
-  world.look(world.q);
-  JointVector beside = world.q;
-  beside[0] += 0.2;
-  world.look(beside);
-  world.update();
+  look_from_two_places(world);
   ExploreOptions options;
   options.seed = 7;
   const auto a = one.choose(world.context(), world.q, options, run_serially);
@@ -120,11 +125,7 @@ TEST_CASE("one seed gives one choice, with one worker and with two", "[explore]"
 TEST_CASE("small steps from the best candidates find better views", "[explore]") {
   SmallWorld world(room_with_wall());
   ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1);
-  world.look(world.q);
-  JointVector beside = world.q;
-  beside[0] += 0.2;
-  world.look(beside);
-  world.update();
+  look_from_two_places(world);
   double with = 0, without = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     ExploreOptions options;
@@ -180,11 +181,7 @@ TEST_CASE("the view after a look that is still to come: another, and the choice 
   SmallWorld world(room_with_wall());
   ViewChooser chooser(world.map.geometry(), world.sensor, 200, 1);
   ViewChooser alone(world.map.geometry(), world.sensor, 200, 1);
-  world.look(world.q);
-  JointVector beside = world.q;
-  beside[0] += 0.2;
-  world.look(beside);
-  world.update();
+  look_from_two_places(world);
   ExploreOptions options;
   const auto first = chooser.choose(world.context(), world.q, options, run_serially);
   const auto same = alone.choose(world.context(), world.q, options, run_serially);
