@@ -165,7 +165,6 @@ class Machine {
   [[nodiscard]] std::optional<CalibrationViewResult> foreseen_calibration_view() {
     return std::exchange(foreseen_calibration_view_, std::nullopt);
   }
-  void forget_foreseen();
 
   /// Waits until the arm has settled, then collects `count` frames with their poses.
   void start_look(bool depth, int count);
@@ -200,6 +199,7 @@ class Machine {
   [[nodiscard]] std::optional<PosedFrame> next_posed(Frames& pending, std::uint64_t& unposed);
   void pose_pending_frames();
   void remember_foreseen(const JobCompleted& done);
+  void forget_foreseen();
   void note_way_frame(const MachineEvent& event);
   void see_way_frames();
   [[nodiscard]] std::optional<PosedFrame> posed(const hal::Frame& frame) const;

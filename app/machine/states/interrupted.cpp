@@ -13,7 +13,6 @@ StateId resume_state(StateId paused) { return is_within(paused, StateId::kExplor
 void enter_paused(Machine& m) {
   Progress& p = m.progress();
   p.paused_at = m.now();
-  m.forget_foreseen();
   m.light(hal::Light::kAmber);
   m.show("paused: press Play to go on");
   m.set_timer(MachineTimer::kState, kPauseMax_s);

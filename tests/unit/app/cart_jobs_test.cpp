@@ -238,6 +238,11 @@ TEST_CASE("no failed allocation of a calibration job ends the process", "[jobs]"
   Bench bench;
   bench.take_views();
   fail_every_allocation(bench, JobKind::kNextCalibrationView, [&] { return bench.here(3); });
+  fail_every_allocation(bench, JobKind::kNextCalibrationView, [&] {
+    FromHere here = bench.here(4);
+    here.after_look = true;
+    return here;
+  });
   fail_every_allocation(bench, JobKind::kSolve, [] { return NoArguments{}; });
   fail_every_allocation(bench, JobKind::kValidate, [] { return NoArguments{}; });
 }
@@ -355,6 +360,11 @@ TEST_CASE("no failed allocation of a mapping job ends the process", "[jobs]") {
   });
   fail_every_allocation(bench, JobKind::kNextSweepView, [&] { return bench.here(1); });
   fail_every_allocation(bench, JobKind::kNextView, [&] { return bench.here(2); });
+  fail_every_allocation(bench, JobKind::kNextView, [&] {
+    FromHere here = bench.here(3);
+    here.after_look = true;
+    return here;
+  });
   fail_every_allocation(bench, JobKind::kCertifyPath, [&] {
     PlanArguments plan;
     plan.from_rad = plan.to_rad = kStart;
@@ -364,6 +374,31 @@ TEST_CASE("no failed allocation of a mapping job ends the process", "[jobs]") {
   fail_every_allocation(bench, JobKind::kCheckBoard, [&] { return bench.look(BoardLook::kConclude, kStart); });
   fail_every_allocation(bench, JobKind::kSummarize, [] { return NoArguments{}; });
   fail_every_allocation(bench, JobKind::kForgetKnownFree, [] { return NoArguments{}; });
+}
+
+TEST_CASE("a path that was foreseen is not certified once nothing says what for", "[jobs]") {
+  Bench bench;
+  bench.calibrate();
+  PlanArguments plan;
+  plan.from_rad = plan.to_rad = kStart;
+  plan.phase = MotionPhase::kMapping;
+  CHECK(bench.result_of<PlanResult>(JobKind::kCertifyPath, plan).found);
+  plan.foreseen = true;
+  CHECK_FALSE(bench.result_of<PlanResult>(JobKind::kCertifyPath, plan).found);
+}
+
+TEST_CASE("jobs are counted and timed by their kind, failed ones too", "[jobs]") {
+  Bench bench;
+  bench.calibrate();
+  const JobTimes& solve = bench.jobs().times(JobKind::kSolve);
+  CHECK(solve.count == 1);
+  CHECK(solve.total_s > 0);
+  CHECK(solve.longest_s == solve.total_s);
+  CHECK_FALSE(bench.execute(JobKind::kSolve, NoArguments{}, 4096).done);
+  CHECK(solve.count == 2);
+  CHECK(solve.longest_s < solve.total_s);
+  CHECK(bench.jobs().times(JobKind::kDetectBoard).count >= 12);
+  CHECK(bench.jobs().times(JobKind::kIntegrate).count == 0);
 }
 
 TEST_CASE("a job beyond its heap allowance fails with the memory's fault, and the next one is done", "[jobs]") {

@@ -141,6 +141,9 @@ TEST_CASE("only wall differs between two runs of one record", "[report]") {
   second.wall = {"2027-02-02T02:02:02Z", 1, 2, true, 3, 4, 5, 6, "/elsewhere", 1, {}};
   ordered_json a = ordered_json::parse(result_json(first)), b = ordered_json::parse(result_json(second));
   CHECK(a["wall"] != b["wall"]);
+  CHECK(a["wall"]["jobs"][0]["name"] == "choosing the next view");
+  CHECK(a["wall"]["jobs"][0]["count"] == 48);
+  CHECK(b["wall"]["jobs"].empty());
   a.erase("wall");
   b.erase("wall");
   CHECK(a.dump() == b.dump());
@@ -151,6 +154,7 @@ TEST_CASE("only wall differs between two runs of one record", "[report]") {
   REQUIRE(wall_begin != std::string::npos);
   CHECK(page_a.substr(0, wall_begin) == page_b.substr(0, wall_begin));
   CHECK(page_a.substr(wall_begin) != page_b.substr(wall_begin));
+  CHECK(page_a.find("135.4 ms", wall_begin) != std::string::npos);  // the mean of those 48
   CHECK(report_html(first) == page_a);
 
   first.cell = "/home/somebody/cells/mine.yaml";

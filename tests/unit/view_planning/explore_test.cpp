@@ -199,7 +199,9 @@ TEST_CASE("the view after a look that is still to come: another, and the choice 
   GainWorker worker = chooser.gain().worker();
   const ViewGain before = chooser.gain().count(world.context(), next->target, worker);
   CHECK(next->gain.weight() <= before.weight());
-  // The look is remembered as if nothing had been chosen meanwhile.
+  // A look is remembered as if nothing had been chosen meanwhile: one in vain, then the one that was chosen.
+  chooser.remember_look(world.context(), first->target);
+  alone.remember_look(world.context(), first->target);
   world.follow(first->path);
   chooser.remember_look(world.context(), world.q);
   alone.remember_look(world.context(), world.q);
