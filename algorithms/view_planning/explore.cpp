@@ -67,7 +67,9 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
     : gain_(geometry, sensor, sampling), candidates_max_(candidates_max) {
   ENSURE(4531, candidates_max > 0 && workers_max > 0 && certificate_samples_max > 0);
   for (int i = 0; i < workers_max; ++i) workers_.push_back(gain_.worker());
-  const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
+  const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max)) + kKeptMax;
+  kept_.reserve(kKeptMax);
+  kept_ahead_.reserve(kKeptMax);
   candidates_.resize(room);
   order_.reserve(room);
   best_.reserve(room);
@@ -77,10 +79,10 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
 std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, const DepthSensor& sensor, int candidates_max,
                                         int workers_max, int certificate_samples_max, const GainSampling& sampling) {
   const auto rays = static_cast<std::size_t>(sampling.columns) * static_cast<std::size_t>(sampling.rows);
-  const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max));
+  const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max)) + kKeptMax;
   const std::size_t worker = geometry.count() + 2 * rays * sizeof(Eigen::Vector3d);
   return GainModel::required_bytes(geometry, sensor, sampling) + static_cast<std::size_t>(workers_max) * worker +
-         room * (sizeof(Candidate) + 3 * sizeof(int));
+         room * (sizeof(Candidate) + 3 * sizeof(int)) + 2 * kKeptMax * sizeof(JointVector);
 }
 
 JointVector ViewChooser::draw_random(const Task& task, Random& random) const {
@@ -150,6 +152,12 @@ void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) co
   // They take turns: random, nearby, aimed.
   const int source = index % kSources;
   out = Candidate{};
+  if (index >= task.drawn()) {
+    out.tries = 1;
+    out.q = kept_[static_cast<std::size_t>(index - task.drawn())];
+    out.free = configuration_is_free(c.arm, c.body, c.space, c.clearance, out.q, kRefinedMargin_m);
+    return;
+  }
   if (source == 2) {
     while (!out.free && out.tries < task.options.tries_per_candidate * kAimedTries) {
       ++out.tries;
@@ -339,9 +347,30 @@ Status ViewChooser::plan_best(const Task& task, ViewChoice& choice) {
   return {};
 }
 
+/// Those that would tell most of what is left, but for the one that was chosen and those that no path was found to.
+void ViewChooser::keep_good(const Task& task, const ViewChoice& choice, std::vector<JointVector>& kept) {
+  std::vector<int>& good = order_;
+  good.clear();
+  for (int i = 0; i < task.candidates(); ++i) {
+    const Candidate& candidate = candidates_[static_cast<std::size_t>(i)];
+    if (candidate.utility_per_s > 0 && !(candidate.q == choice.target) &&
+        std::ranges::find(unreached_, i) == unreached_.end())
+      good.push_back(i);
+  }
+  const auto tells_more = [this](int a, int b) {
+    const double wa = candidates_[static_cast<std::size_t>(a)].gain.weight();
+    const double wb = candidates_[static_cast<std::size_t>(b)].gain.weight();
+    return wa > wb || (wa == wb && a < b);
+  };
+  const std::size_t count = std::min(good.size(), kKeptMax);
+  kept.clear();
+  std::ranges::partial_sort(good, good.begin() + static_cast<std::ptrdiff_t>(count), tells_more);
+  for (std::size_t i = 0; i < count; ++i) kept.push_back(candidates_[static_cast<std::size_t>(good[i])].q);
+}
+
 bool ViewChooser::can_move(const Task& task) const {
   const ViewContext& c = task.context;
-  const auto last = candidates_.begin() + task.candidates();
+  const auto last = candidates_.begin() + task.drawn();
   return std::any_of(candidates_.begin(), last, [&](const Candidate& candidate) {
     return candidate.free && certify(c.arm, c.body, c.space, c.clearance, task.current, candidate.q).certified();
   });
@@ -350,7 +379,7 @@ bool ViewChooser::can_move(const Task& task) const {
 void ViewChooser::certify_end(const Task& task, ViewChoice& choice) const {
   TerminationCertificate& certificate = choice.certificate;
   certificate.gain_min = task.options.gain_min;
-  for (int i = 0; i < task.candidates(); ++i) {
+  for (int i = 0; i < task.drawn(); ++i) {
     const Candidate& candidate = candidates_[static_cast<std::size_t>(i)];
     if (!candidate.free) continue;
     ++(i % kSources == 0   ? certificate.random_samples
@@ -383,6 +412,7 @@ Result<ViewChoice> ViewChooser::choose(const ViewContext& context, const JointVe
 }
 
 void ViewChooser::adopt(const ViewGain& gain, std::size_t unknown, std::uint32_t gain_min) {
+  kept_.swap(kept_ahead_);
   note_progress(unknown, gain_min);
   made_room_only_ = gain.unknown < gain_min;
 }
@@ -396,10 +426,11 @@ Result<ViewChoice> ViewChooser::search(const ViewContext& context, const JointVe
             .depth_T_flange = context.flange_T_depth.inverse(),
             .again_min = in_vain_ < kInVainMax ? options.again_few : options.again_min,
             .certificate = false,
-            .samples = candidates_max_};
+            .samples = candidates_max_,
+            .kept = static_cast<int>(kept_.size())};
   for (const bool certificate : {false, true}) {
     task.certificate = certificate;
-    task.samples = certificate ? options.certificate_samples : candidates_max_;
+    if (certificate) task.samples = options.certificate_samples, task.kept = 0;
     score(task, run_parallel);
     refine(task, run_parallel);
     for (int i = 0; i < task.candidates(); ++i) {
@@ -407,7 +438,10 @@ Result<ViewChoice> ViewChooser::search(const ViewContext& context, const JointVe
       choice.free += candidates_[static_cast<std::size_t>(i)].free ? 1 : 0;
     }
     if (Status planned = plan_best(task, choice); !planned) return std::unexpected(planned.error());
-    if (choice.outcome == ViewChoice::Outcome::kChosen) return choice;
+    if (choice.outcome == ViewChoice::Outcome::kChosen) {
+      keep_good(task, choice, options.after_look ? kept_ahead_ : kept_);
+      return choice;
+    }
   }
   certify_end(task, choice);
   return choice;

@@ -89,6 +89,8 @@ class ViewChooser {
   [[nodiscard]] Planner& planner() { return planner_; }
 
  private:
+  /// What is left at the end is small and far apart, and few candidates find it: they are not forgotten.
+  static constexpr std::size_t kKeptMax = 128;
   static constexpr int kSources = 3;  ///< of candidates, which take turns: random, nearby, aimed
   struct Candidate {
     JointVector q;
@@ -107,7 +109,9 @@ class ViewChooser {
     std::uint32_t again_min = 0;  ///< voxels made usable for motion that are worth a view now
     bool certificate = false;     ///< the large sample
     int samples = 0;              ///< in all; of each source for the certificate
-    [[nodiscard]] int candidates() const { return certificate ? kSources * samples : samples; }
+    int kept = 0;                 ///< candidates of earlier choices, after those that are drawn
+    [[nodiscard]] int drawn() const { return certificate ? kSources * samples : samples; }
+    [[nodiscard]] int candidates() const { return drawn() + kept; }
   };
 
   [[nodiscard]] JointVector draw_random(const Task& task, Random& random) const;
@@ -119,6 +123,7 @@ class ViewChooser {
   void score(const Task& task, RunParallel run_parallel);
   void refine(const Task& task, RunParallel run_parallel);
   void note_progress(std::size_t unknown, std::uint32_t gain_min);
+  void keep_good(const Task& task, const ViewChoice& choice, std::vector<JointVector>& kept);
   [[nodiscard]] Result<ViewChoice> search(const ViewContext& context, const JointVector& current,
                                           const ExploreOptions& options, RunParallel run_parallel);
   [[nodiscard]] static bool worthwhile(const Task& task, const Candidate& candidate);
@@ -135,10 +140,12 @@ class ViewChooser {
   bool made_room_only_ = false;  ///< the latest view chosen promised nothing but usable voxels
   int in_vain_ = 0;              ///< such views in a row after which no more was known
   std::vector<GainWorker> workers_;
-  std::vector<Candidate> candidates_;  ///< room for the certificate's samples
-  std::vector<int> order_;             ///< a heap: the best utility, or upper bound of one, is on top
-  std::vector<int> best_;              ///< those that are refined
-  std::vector<int> unreached_;         ///< candidates that the planner failed on
+  std::vector<Candidate> candidates_;    ///< room for the certificate's samples
+  std::vector<int> order_;               ///< a heap: the best utility, or upper bound of one, is on top
+  std::vector<int> best_;                ///< those that are refined
+  std::vector<int> unreached_;           ///< candidates that the planner failed on
+  std::vector<JointVector> kept_;        ///< good candidates of the latest choice, which stand for the next one, too
+  std::vector<JointVector> kept_ahead_;  ///< those of a choice with `after_look`, until adopt()
   int candidates_max_;
   Planner planner_;
   FixedVector<JointVector, 32> visited_;  ///< the latest looks

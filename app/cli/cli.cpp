@@ -98,10 +98,10 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   run_app->add_option("--faults", run.faults, "what goes wrong, e.g. depth.drop=0.05,operator.pause_at=20:5");
   run_app->add_option(
       "--robot", robot,
-      "who moves the arm (robot.host): the address of a Universal Robots controller, at the pace of the "
-      "clock, where what the cameras see of it is simulated by `firstlook ur-sim --cell ...` there, with "
-      "--lockstep in virtual time; simulated: such a controller in this process; auto: that where "
-      "the arm is a UR; none: the cell itself, without a controller");
+      "who moves the arm (robot.host): auto, as it is: a simulated Universal Robots controller in this process "
+      "where the cell's arm is a UR, else the cell itself; simulated: always such a controller; none: always the "
+      "cell itself; or the address of a controller, at the pace of the clock, where what the cameras see of it is "
+      "simulated by `firstlook ur-sim --cell ...` there, with --lockstep in virtual time");
   run_app
       ->add_option("--robot-at", run.robot_happens,
                    "SECONDS=WHAT happens to the simulated controller, such as 20=reboot; may be repeated; "

@@ -34,7 +34,7 @@ struct Config {
   } arm;
 
   struct Robot {                            ///< a Universal Robots controller on the network
-    std::string host = "none";              ///< name or address; none: the arm of the simulated cell
+    std::string host = "auto";              ///< name or address; in a simulated cell auto, simulated, none, too
     std::string own_address = "auto";       ///< this computer's, as the controller sees it
     int program_port = 50002;               ///< where the External Control URCap asks for our program
     int control_port = 50001;               ///< where that program asks for commands
@@ -43,7 +43,7 @@ struct Config {
     std::optional<JointVector> tcp_offset;  ///< that it must have set: m, and a rotation vector in rad; empty: any
     std::string calibration_file = "none";  ///< of ur_calibration: the factory correction, compared with its own
     bool operator==(const Robot&) const = default;
-    [[nodiscard]] bool given() const { return host != "none"; }
+    [[nodiscard]] bool none() const { return host == "none"; }  ///< the simulated cell moves its arm itself
   } robot;
 
   struct SafeZone {

@@ -70,8 +70,8 @@ void add_robot_keys(Keys& keys, Config& c) {
                   0,
                   {},
                   "name or address of a Universal Robots controller, CB3 or e-Series; simulated: one in this process, "
-                  "whose protocols are spoken; auto: that where the simulated cell's arm is a UR; none: the cell's own "
-                  "arm"});
+                  "whose protocols are spoken; auto: that where the simulated cell's arm is a UR, else the cell's own "
+                  "arm; none: always that"});
   keys.push_back({"robot.own_address",
                   &c.robot.own_address,
                   0,
@@ -553,7 +553,7 @@ std::string broken_rule(const Config& c) {
   if (c.robot.tcp_offset && c.robot.tcp_offset->size() != 6) {
     return "robot.tcp_offset must be null or six numbers: [x, y, z, rx, ry, rz] in m and rad";
   }
-  if (!c.robot.given() && c.robot.calibration_file != "none") {
+  if (c.robot.none() && c.robot.calibration_file != "none") {
     return "robot.calibration_file needs robot.host: the arm of a simulated cell has the published kinematics";
   }
   if (c.robot.program_port == c.robot.control_port) return "robot.program_port and robot.control_port must differ";

@@ -44,7 +44,7 @@ Result<std::unique_ptr<CellRobot>> CellRobot::find(const RunCommand& command, co
                                                    const sim::Scene& scene) {
   const memory::SimulationScope simulation;
   const std::string& host = config.robot.host;
-  if (!config.robot.given() || (host == kWhereItCan && !has_controller(scene))) {
+  if (config.robot.none() || (host == kWhereItCan && !has_controller(scene))) {
     if (const Status fits = refuse_for_own_arm(command, config, scene); !fits) return std::unexpected(fits.error());
     return nullptr;
   }
@@ -71,10 +71,22 @@ Status CellRobot::start_in_process(sim::ur::Timetable timetable, const Config& c
   auto controller = make_simulated_ur(words, &scene);
   if (!controller) return std::unexpected(controller.error());
   controller_ = std::move(*controller);
+  install(config.robot);
   service_ = std::make_unique<sim::ur::SteppedService>(*controller_, std::move(timetable));
   links_ = std::make_unique<sim::ur::SteppedLinks>(
       [this](std::string_view asked, std::string& told) { return service_->turn(asked, told); });
   return follow_steps();
+}
+
+/// A site whose controller is set as it should be.
+void CellRobot::install(const Config::Robot& wanted) {
+  sim::ur::Controller& controller = controller_->controller();
+  if (wanted.payload_kg >= 0)
+    controller.set_payload({.mass_kg = wanted.payload_kg, .center_m = {}, .inertia_kg_m2 = {}});
+  if (!wanted.tcp_offset) return;
+  sim::ur::Vector6 offset{};
+  for (int i = 0; i < 6; ++i) offset[static_cast<std::size_t>(i)] = (*wanted.tcp_offset)[i];
+  controller.set_tcp_offset(offset);
 }
 
 Status CellRobot::follow_steps() {

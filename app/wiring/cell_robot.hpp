@@ -42,6 +42,7 @@ class CellRobot {
  private:
   CellRobot() = default;
   [[nodiscard]] Status start_in_process(sim::ur::Timetable timetable, const Config& config, const sim::Scene& scene);
+  void install(const Config::Robot& wanted);
   [[nodiscard]] Status find_on_network(const sim::Faults& faults, const Config& config);
   [[nodiscard]] Status follow_steps();
 

@@ -170,8 +170,9 @@ RobotRecord NetworkArm::record(Narrator& narrator) const {
   record.broken = robot_->robot().rtde().counters().broken;
   narrator.line(
       fmt::format("robot     from Play to consent {:.3f} s, to the first motion {:.3f} s; a segment begins within "
-                  "{:.3f} s, a stop stands within {:.3f} s",
-                  delays.consent_s, delays.motion_s, delays.accept_s, delays.stop_s));
+                  "{:.3f} s{}",
+                  delays.consent_s, delays.motion_s, delays.accept_s,
+                  delays.stop_s > 0 ? fmt::format(", a stop stands within {:.3f} s", delays.stop_s) : ""));
   return record;
 }
 

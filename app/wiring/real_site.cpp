@@ -83,7 +83,7 @@ Status refuse_what_does_not_fit(const RunCommand& command, const Config& config)
 
 bool names_network_robot(const Config& config) {
   const std::string& host = config.robot.host;
-  return config.robot.given() && host != CellRobot::kInProcess && host != CellRobot::kWhereItCan;
+  return !config.robot.none() && host != CellRobot::kInProcess && host != CellRobot::kWhereItCan;
 }
 
 bool names_real_cart(const Config& config) { return config.camera.device != "none" || config.depth.device != "none"; }

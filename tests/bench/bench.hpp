@@ -115,6 +115,7 @@ void bench_gain(const Options& options, Report& report);
 void bench_motion(const Options& options, Report& report);
 void bench_views(const Options& options, Report& report);
 /// Not one of those that run without a name.
+void bench_tail(const Options& options, Report& report);
 void bench_thesis_tuning(const Options& options, Report& report);
 void bench_loop(const Options& options, Report& report);
 

@@ -35,7 +35,9 @@ struct Exploration {
         path = choice->path;
         return true;
       }
-      if (choice && choice->outcome == ViewChoice::Outcome::kComplete) return false;
+      // What cannot be seen with room to spare may still be seen without.
+      if (pace != ExploredCell::Pace::kRoomy && choice && choice->outcome == ViewChoice::Outcome::kComplete)
+        return false;
     }
     return false;
   }
@@ -50,17 +52,21 @@ Result<ViewChoice> choose_ours(ExploredCell& cell, const ViewContext& context, c
   });
 }
 
-ExploredCell::Way explore(std::uint64_t seed, Views views, WorkerPool& workers, const ThesisOptions& thesis,
-                          Until until) {
+ExploredCell::Way explore(std::uint64_t seed, Views views, WorkerPool& workers, KnownTruth& truth,
+                          const ThesisOptions& thesis, Until until) {
   const bool omniscient = views == Views::kOmniscient, as_thesis = views == Views::kThesis;
   ExploredCell cell(fmt::format("random:{}", seed), seed, omniscient ? kCandidatesOmniscient : kCandidates,
                     workers.workers());
-  cell.find_truth(workers);
+  cell.find_truth(workers, truth);
   if (as_thesis) cell.sweep(false);  // ours is over at once: the first view tells more a second
   Exploration exploration{cell, views, workers, {}, thesis};
   exploration.drawing.seed = exploration.options.seed = seed;
+  exploration.options.gain_min = kWorthVoxels;
   if (omniscient) exploration.options.refined = kRefinedOmniscient;
-  const auto reached = [&] { return until == Until::k95 ? cell.way().to_95 : cell.way().to_99; };
+  const auto reached = [&] {
+    if (until == Until::kEnd) return false;
+    return until == Until::k95 ? cell.way().to_95.has_value() : cell.way().to_99.has_value();
+  };
   while (!reached() && cell.way().end.stops < kStopsMax) {
     Path path;
     if (!exploration.choose_view(path)) {

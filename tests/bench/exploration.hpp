@@ -13,11 +13,15 @@ enum class Views : std::uint8_t { kOurs, kThesis, kOmniscient };
 [[nodiscard]] Result<ViewChoice> choose_ours(ExploredCell& cell, const ViewContext& context,
                                              const ExploreOptions& options, WorkerPool& workers);
 
-enum class Until : std::uint8_t { k95, k99 };  ///< percent of what can be observed; what comes then has no figure
+/// Percent of what can be observed, or no view left; what comes then has no figure.
+enum class Until : std::uint8_t { k95, k99, kEnd };
+
+/// What can be observed in a cell, by who explored it first; empty before.
+using KnownTruth = std::optional<sim::ObservableSet>;
 
 /// Explores `random:seed` so far, or until no view is left, or for 400 stops.
 /// @param thesis  for kThesis; its seed, step and limits are set here
-[[nodiscard]] ExploredCell::Way explore(std::uint64_t seed, Views views, WorkerPool& workers,
+[[nodiscard]] ExploredCell::Way explore(std::uint64_t seed, Views views, WorkerPool& workers, KnownTruth& truth,
                                         const ThesisOptions& thesis = {}, Until until = Until::k99);
 
 }  // namespace firstlook::bench

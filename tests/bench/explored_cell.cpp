@@ -49,7 +49,8 @@ ExploredCell::ExploredCell(const std::string& cell, std::uint64_t seed, int cand
       free_(geometry().count(), 0),
       zone_(geometry().count(), 0),
       inserter_(geometry(), sensor_of(renderer_)),
-      chooser_(geometry(), sensor(), candidates_max, workers_max),
+      chooser_(geometry(), sensor(), candidates_max, workers_max, 1000,
+               GainSampling{.cluster_voxels_min = kWorthVoxels}),
       start_(scene_.start_rad),
       q_(scene_.start_rad) {
   map_.set_safe_zone(scene_.safe_zone);
@@ -127,8 +128,7 @@ void ExploredCell::sweep(bool looks_on_the_way) {
   }
 }
 
-void ExploredCell::find_truth(WorkerPool& workers) {
-  world_.matter(geometry(), matter_);
+sim::ObservableProblem ExploredCell::observable_problem() const {
   sim::ObservableProblem problem;
   problem.arm = &arm_;
   problem.world = &world_;
@@ -145,7 +145,13 @@ void ExploredCell::find_truth(WorkerPool& workers) {
   problem.options.sensor_range_trusted_m = sensor().range_trusted_m;
   problem.options.zone_margin_m = kZoneMargin_m;
   problem.options.zone_floor_m = kZoneFloor_m;
-  observable_ = sim::observable_set(problem, workers);
+  return problem;
+}
+
+void ExploredCell::find_truth(WorkerPool& workers, std::optional<sim::ObservableSet>& observable) {
+  world_.matter(geometry(), matter_);
+  if (!observable) observable = sim::observable_set(observable_problem(), workers);
+  observable_ = *observable;
   inside_.resize(matter_.size());
   for (std::size_t i = 0; i < matter_.size(); ++i) inside_[i] = matter_[i] != 0 && observable_.seen[i] == 0 ? 1 : 0;
   note_coverage();

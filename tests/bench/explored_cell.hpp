@@ -14,6 +14,8 @@
 
 namespace firstlook::bench {
 
+inline constexpr int kWorthVoxels = 12;  ///< as a job's explore.cluster_voxels_min
+
 /// What a job has after its calibration: the arm in the cell, the map, and where it may move. The sensor is the fast
 /// one; depth and hand-eye transform are true.
 class ExploredCell {
@@ -41,8 +43,9 @@ class ExploredCell {
   void sweep(bool looks_on_the_way);
 
   /// What can be observed here, and where there is matter: the truth, for grading and for views that know it. Call it
-  /// first of all when `way` is wanted; takes some seconds.
-  void find_truth(WorkerPool& workers);
+  /// first of all when `way` is wanted.
+  /// @param observable  of this cell; when empty it is found, which takes some seconds, and kept there
+  void find_truth(WorkerPool& workers, std::optional<sim::ObservableSet>& observable);
   /// As context(), for a chooser that expects what a look will tell: what can be observed is the zone, and matter that
   /// cannot be seen into stops rays. A surface whose voxels are all observable is thin: rays end there, and it counts
   /// nothing, unless `surfaces_count`. Lives until the next call.
@@ -63,6 +66,7 @@ class ExploredCell {
  private:
   [[nodiscard]] ViewContext context_of(const VoxelMap& map, const std::vector<std::uint8_t>& zone) const;
   [[nodiscard]] Transform<Flange, Depth> mount() const;
+  [[nodiscard]] sim::ObservableProblem observable_problem() const;
   void look();
   void note_coverage();
   [[nodiscard]] bool touches_inside(std::size_t index) const;

@@ -27,6 +27,7 @@ constexpr Topic kTopics[] = {
     {"motion", firstlook::bench::bench_motion},
     {"views", firstlook::bench::bench_views},
     {"loop", firstlook::bench::bench_loop},
+    {"tail", firstlook::bench::bench_tail, true},
     {"thesis_tuning", firstlook::bench::bench_thesis_tuning, true},
 };
 

@@ -72,9 +72,10 @@ void bench_strategies(const Options& options, Report& report) {
   WorkerPool workers(kWorkers);
   std::vector<std::pair<Reached, Reached>> thesis_95, omniscient_95, omniscient_99;
   for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(options.amount(1, 8, 100)); ++seed) {
-    const ExploredCell::Way ours = explore(seed, Views::kOurs, workers);
-    const ExploredCell::Way thesis = explore(seed, Views::kThesis, workers);
-    const ExploredCell::Way omniscient = explore(seed, Views::kOmniscient, workers);
+    KnownTruth truth;
+    const ExploredCell::Way ours = explore(seed, Views::kOurs, workers, truth);
+    const ExploredCell::Way thesis = explore(seed, Views::kThesis, workers, truth);
+    const ExploredCell::Way omniscient = explore(seed, Views::kOmniscient, workers, truth);
     thesis_95.emplace_back(ours.to_95, thesis.to_95);
     omniscient_95.emplace_back(ours.to_95, omniscient.to_95);
     omniscient_99.emplace_back(ours.to_99, omniscient.to_99);

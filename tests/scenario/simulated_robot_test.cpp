@@ -187,7 +187,7 @@ TEST_CASE("whole jobs meet what can happen to a robot: done, or stopped with a r
   CHECK(whole_job({"30=slider=0.3", "60=slider=1", "75=clock=3600"}) == "done");
 }
 
-TEST_CASE("a whole job on an e-Series; a TCP and a factory correction that are another's are refused", "[scenario]") {
+TEST_CASE("a whole job on an e-Series; a factory correction that is another's is refused", "[scenario]") {
   const JobFolder folder;
   folder.write("cell.yaml",
                "arm: ur5e\nwalls: {low_m: [-2.0, -1.9], high_m: [2.1, 2.0], height_m: 2.6}\n"
@@ -208,10 +208,12 @@ TEST_CASE("a whole job on an e-Series; a TCP and a factory correction that are a
   CHECK(result["robot"]["kinematics"]["file"].is_null());
   CHECK(result["robot"]["kinematics"]["ur_calibration_hash"].get<std::string>().starts_with("calib_"));
 
-  folder.write("tcp.yaml", "robot: {tcp_offset: [0, 0, 0.1, 0, 0, 0]}\n");
-  const ProgramResult tcp = run("tcp", {"--config", "tcp.yaml"});
-  CHECK(tcp.exit_code == 3);
-  CHECK(tcp.err.find("robot.tcp_offset") != std::string::npos);
+  // A controller in this process is installed as the site's is said to be.
+  folder.write("tcp.yaml", "robot: {tcp_offset: [0, 0, 0.1, 0, 0, 0], payload_kg: 1.5}\n");
+  const ProgramResult tcp = run("tcp", {"--config", "tcp.yaml", "--faults", "operator.stop_at=3"});
+  INFO(tcp.err);
+  CHECK(tcp.exit_code == 6);
+  CHECK(folder.read_json("tcp/result.json")["reason"].get<std::string>().starts_with("E5005"));
   // The published UR5e: not this robot.
   folder.write("published.yaml",
                "kinematics:\n  shoulder: {x: 0, y: 0, z: 0.1625, roll: 0, pitch: 0, yaw: 0}\n"
@@ -280,7 +282,7 @@ TEST_CASE("a job on a robot whose factory correction comes from a file of ROS", 
   CHECK(another.err.find("robot.calibration_file") != std::string::npos);
 }
 
-TEST_CASE("what a simulated controller cannot be", "[scenario]") {
+TEST_CASE("what a simulated controller cannot be or is not", "[scenario]") {
   const JobFolder folder;
   CHECK(folder.run({"ur-sim", "--lockstep"}).exit_code == 2);
   const UrSim robot({"--cell", "empty", "--seed", "1", "--lockstep"});
@@ -288,6 +290,11 @@ TEST_CASE("what a simulated controller cannot be", "[scenario]") {
   const ProgramResult faults =
       folder.run_job("run", {"--robot", "127.0.0.1", "--config", "site.yaml", "--faults", "operator.stop_at=9"});
   CHECK(faults.exit_code == 2);
+  folder.write("tcp.yaml",
+               "robot: {tcp_offset: [0, 0, 0.1, 0, 0, 0], port_offset: " + std::to_string(robot.offset) + "}\n");
+  const ProgramResult tcp = folder.run_job("tcp", {"--robot", "127.0.0.1", "--config", "tcp.yaml"});
+  CHECK(tcp.exit_code == 3);
+  CHECK(tcp.err.find("robot.tcp_offset") != std::string::npos);
 }
 
 }  // namespace firstlook

@@ -124,16 +124,17 @@ TEST_CASE("one seed gives one choice, with one worker and with two", "[explore]"
 
 TEST_CASE("small steps from the best candidates find better views", "[explore]") {
   SmallWorld world(room_with_wall());
-  ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1);
   look_from_two_places(world);
   double with = 0, without = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1);
+    ViewChooser stepping(world.map.geometry(), world.sensor, 100, 1);
     ExploreOptions options;
     options.seed = seed;
     options.refined = 0;
     const auto plain = chooser.choose(world.context(), world.q, options, run_serially);
     options.refined = 16;
-    const auto refined = chooser.choose(world.context(), world.q, options, run_serially);
+    const auto refined = stepping.choose(world.context(), world.q, options, run_serially);
     REQUIRE(plain);
     REQUIRE(refined);
     REQUIRE(refined->outcome == ViewChoice::Outcome::kChosen);
@@ -142,6 +143,30 @@ TEST_CASE("small steps from the best candidates find better views", "[explore]")
     without += plain->utility_per_s;
   }
   CHECK(with > 1.1 * without);
+}
+
+TEST_CASE("what was good and not chosen stands for the next choice", "[explore]") {
+  SmallWorld world(room_with_wall());
+  look_from_two_places(world);
+  ViewChooser chooser(world.map.geometry(), world.sensor, 10, 1, 300);
+  double remembering = 0, forgetting = 0;
+  ExploreOptions options;
+  options.refined = 0;
+  options.certificate_samples = 300;
+  for (options.step = 0; options.step < 12; ++options.step) {
+    ViewChooser fresh(world.map.geometry(), world.sensor, 10, 1, 300);
+    const auto one = chooser.choose(world.context(), world.q, options, run_serially);
+    const auto other = fresh.choose(world.context(), world.q, options, run_serially);
+    REQUIRE(one);
+    REQUIRE(other);
+    REQUIRE(one->outcome == ViewChoice::Outcome::kChosen);
+    CHECK(world.entries_into_unknown(one->path) == 0);
+    CHECK(one->utility_per_s >= other->utility_per_s);
+    remembering += one->utility_per_s;
+    forgetting += other->utility_per_s;
+  }
+  INFO(remembering << " and " << forgetting);
+  CHECK(remembering > 1.01 * forgetting);
 }
 
 TEST_CASE("an arm with no room to move says that nothing can be reached", "[explore]") {
