@@ -63,8 +63,9 @@ void Programs::follow_request() {
   if (state == ProgramRequest::State::kWaiting) return;
   const std::unique_ptr<ProgramRequest> request = std::move(request_);
   if (state == ProgramRequest::State::kAnswered) {
-    static_cast<void>(start(request->program()));
+    start_failed_ = !start(request->program());
   } else {
+    start_failed_ = true;
     controller_.tell({.kind = Kind::kPopup,
                       .error = true,
                       .title = "External Control",
@@ -81,6 +82,7 @@ void Programs::step() {
       begin_pending();
     } else {
       pending_.reset();
+      start_failed_ = true;
     }
   }
   if (program_ != nullptr && controller_.playing()) {
@@ -124,7 +126,10 @@ void Programs::submit(const std::string& script) {
 }
 
 bool Programs::load(std::string_view name) {
-  if (name.starts_with(kFolder)) name.remove_prefix(kFolder.size());
+  // A simulator of UR's has the folder elsewhere: "/ursim/programs/".
+  if (const std::size_t folder = name.find(kFolder); folder != std::string_view::npos) {
+    name.remove_prefix(folder + kFolder.size());
+  }
   for (const StoredProgram& program : stored_) {
     if (program.name != name) continue;
     static_cast<void>(stop());
@@ -134,7 +139,12 @@ bool Programs::load(std::string_view name) {
   return false;
 }
 
+bool Programs::starting() const {
+  return request_ != nullptr || pending_ != nullptr || controller_.state().runtime == RuntimeState::kResuming;
+}
+
 bool Programs::play() {
+  start_failed_ = false;
   if (!controller_.can_play()) return false;
   switch (controller_.state().runtime) {
     case RuntimeState::kPaused:

@@ -129,6 +129,7 @@ TEST_CASE("UR's client library finds the documented answers on the dashboard", "
   session.output().clear();
   const auto answer = [&](const std::string& command) {
     session.receive(command + "\n");
+    for (int i = 0; i < 5000 && session.output().empty(); ++i) robot.robot.step();
     std::string line = session.output();
     session.output().clear();
     REQUIRE(line.ends_with('\n'));
@@ -176,6 +177,8 @@ TEST_CASE("UR's client library finds the documented answers on the dashboard", "
   matches("get serial number", "20.*");
   matches("get robot model", "UR.*");
   matches("generate flight report system", "(Flight Report generated with id:).*");
+  matches("generate flight report ", "(Flight Report generated with id:).*");
+  matches("load /ursim/programs/cart.urp", "Loading program: .*cart\\.urp");
   matches("generate support file .", "(Completed successfully:).*");
   matches("saveLog", "Log saved to disk");
   if (model == "ur5e") {
