@@ -96,7 +96,7 @@ TEST_CASE("UR's client library sets up RTDE: is the robot booted, pause, inputs,
       "actual_digital_input_bits,actual_digital_output_bits,standard_analog_input0,standard_analog_input1,"
       "standard_analog_output0,standard_analog_output1,analog_io_types,tool_mode,tool_analog_input_types,"
       "tool_analog_input0,tool_analog_input1,tool_output_voltage,tool_output_current,tool_temperature,robot_mode,"
-      "safety_mode,robot_status_bits,safety_status_bits,actual_current";
+      "safety_mode,robot_status_bits,safety_status_bits,actual_current,tcp_offset";
   CHECK(client.recipe('O', big_endian(hz) + outputs) == 1);
   CHECK(client.ask(rtde('S')).payload == "\1");
   const auto first = client.data(0.1);

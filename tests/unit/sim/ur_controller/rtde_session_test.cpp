@@ -114,20 +114,36 @@ TEST_CASE("frequencies divide the control loop's", "[ur]") {
   CHECK(packages(e_series, std::nan("")) == 500);
 }
 
-TEST_CASE("several recipes of one client, each with its number and frequency", "[ur]") {
+TEST_CASE("a client has one output recipe: the next takes its place", "[ur]") {
   UrRobot robot("ur5e");
   Client client(robot);
   client.protocol_2();
-  CHECK(client.outputs(500, "timestamp")[0] == 1);
-  CHECK(client.outputs(100, "robot_mode,safety_mode")[0] == 2);
+  CHECK(client.outputs(500, "timestamp,actual_q") == with_id(1, "DOUBLE,VECTOR6D"));
   client.start();
-  int first = 0, second = 0;
-  for (const std::string& payload : client.data(1)) {
-    if (payload[0] == 1) first += payload.size() == 9 ? 1 : 0;
-    if (payload[0] == 2) second += payload.size() == 9 ? 1 : 0;
-  }
-  CHECK(first == 500);
-  CHECK(second == 100);
+  CHECK(client.data(1).size() == 500);
+  CHECK(client.outputs(100, "robot_mode,nonsense") == with_id(0, "INT32,NOT_FOUND"));  // nothing changes
+  CHECK(client.data(1).back().size() == 57);
+  CHECK(client.outputs(100, "robot_mode,safety_mode") == with_id(1, "INT32,INT32"));
+  const auto data = client.data(1);
+  CHECK(data.size() == 100);
+  CHECK(data.back().size() == 9);
+}
+
+TEST_CASE("without an output recipe nothing starts", "[ur]") {
+  UrRobot robot("ur5e");
+  Client client(robot);
+  client.protocol_2();
+  CHECK(client.inputs("input_int_register_0") == with_id(1, "INT32"));
+  CHECK(client.ask(rtde('S')).payload == std::string(1, '\0'));
+  CHECK(client.outputs(10, "timestamp") == with_id(1, "DOUBLE"));
+  client.start();
+}
+
+TEST_CASE("the tool's offset is there from 3.12 and 5.5.1 on", "[ur]") {
+  UrRobot robot("ur5");
+  Client client(robot);
+  client.protocol_2();
+  CHECK(client.outputs(125, "tcp_offset") == with_id(1, "VECTOR6D"));
 }
 
 TEST_CASE("protocol 1 has neither frequency nor number", "[ur]") {
@@ -158,6 +174,7 @@ TEST_CASE("inputs take effect: slider, outputs under their masks, registers", "[
                       "standard_analog_output_1") == with_id(3, "UINT8,UINT8,DOUBLE,DOUBLE"));
   CHECK(client.inputs("input_bit_registers0_to_31,input_bit_register_64,input_int_register_0,input_int_register_47,"
                       "input_double_register_47") == with_id(4, "UINT32,BOOL,INT32,INT32,DOUBLE"));
+  CHECK(client.outputs(1, "timestamp") == with_id(1, "DOUBLE"));
   client.start();
   CHECK(client.send(rtde('U', std::string("\1") + big_endian(1, 4) + big_endian(0.25))).empty());
   CHECK(robot.state().speed_slider == 0.25);
