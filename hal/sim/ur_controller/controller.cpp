@@ -136,6 +136,7 @@ void Controller::reboot() {
   power_off();
   const ControllerState before = state_;
   state_ = {};
+  watchdogs_.clear();
   state_.control_step = before.control_step;
   state_.safety_mode = emergency_;
   state_.runtime = RuntimeState::kStopped;

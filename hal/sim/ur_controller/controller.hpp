@@ -8,6 +8,7 @@
 #include "hal/sim/ur_controller/controller_events.hpp"
 #include "hal/sim/ur_controller/controller_identity.hpp"
 #include "hal/sim/ur_controller/controller_state.hpp"
+#include "hal/sim/ur_controller/rtde_watchdogs.hpp"
 
 namespace firstlook::sim::ur {
 
@@ -78,6 +79,7 @@ class Controller {
   [[nodiscard]] const ArmMotion& motion() const { return motion_; }
   [[nodiscard]] InputsOutputs& io() { return state_.io; }
   [[nodiscard]] Registers& inputs() { return state_.inputs; }
+  [[nodiscard]] RtdeWatchdogs& watchdogs() { return watchdogs_; }
   [[nodiscard]] Registers& outputs() { return state_.outputs; }
   void set_speed_slider(double fraction);  ///< clamped to 0..1; not finite: ignored
   void set_payload(const Payload& payload) { state_.payload = payload; }
@@ -103,6 +105,7 @@ class Controller {
   ArmMotion motion_;
   ControllerState state_;
   EventLog events_;
+  RtdeWatchdogs watchdogs_;
   double clock_s_;  ///< that its clock showed in cycle `clock_from_`
   std::uint64_t clock_from_ = 0;
   std::uint64_t mode_until_ = 0;  ///< the cycle in which kPowerOn, or the release of brakes, ends; 0: nothing under way

@@ -41,6 +41,19 @@ void Programs::end_program() {
   controller_.tell({.kind = Kind::kKey, .title = "PROGRAM_XXX_STOPPED", .text = program_->code().name});
   program_.reset();
   controller_.set_script_line(0);
+  controller_.watchdogs().clear();
+}
+
+void Programs::follow_watchdogs() {
+  RtdeWatchdogs& watchdogs = controller_.watchdogs();
+  const std::uint64_t now = controller_.state().control_step;
+  if (program_ == nullptr || !controller_.playing()) return watchdogs.hold(now);
+  const auto late = watchdogs.late(now);
+  if (!late || *late == RtdeWatchdogs::Action::kIgnore) return;
+  controller_.tell(
+      {.kind = Kind::kErrorCode, .warning = true, .text = "RTDE watchdog: an input was not renewed in time"});
+  if (*late == RtdeWatchdogs::Action::kPause) return controller_.pause();
+  controller_.stop();
 }
 
 void Programs::begin_pending() {
@@ -75,6 +88,7 @@ void Programs::follow_request() {
 
 void Programs::step() {
   follow_request();
+  follow_watchdogs();
   const RuntimeState runtime = controller_.state().runtime;
   if (runtime == RuntimeState::kStopping || runtime == RuntimeState::kStopped) end_program();
   if (pending_ != nullptr && program_ == nullptr && runtime == RuntimeState::kStopped) {

@@ -57,6 +57,7 @@ class Programs {
   [[nodiscard]] bool start(const std::string& script);
   [[nodiscard]] bool start_loaded();
   void follow_request();
+  void follow_watchdogs();
   void begin_pending();
   void end_program();
   void tell_error(const script::ScriptError& error);

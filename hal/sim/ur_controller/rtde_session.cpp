@@ -182,7 +182,10 @@ void RtdeSession::take_data(std::string_view payload) {
     return send_text(fmt::format("input recipe {}: {} bytes instead of {}", number, payload.size(), bytes));
   }
   RtdeInputs inputs;
-  for (const RtdeInput& field : recipe) field.read(controller_, inputs, field.index, wire);
+  for (const RtdeInput& field : recipe) {
+    field.read(controller_, inputs, field.index, wire);
+    controller_.watchdogs().renew({field.row, field.index}, controller_.state().control_step);
+  }
   apply_rtde_inputs(inputs, controller_);
 }
 

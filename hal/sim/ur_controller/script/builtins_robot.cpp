@@ -1,7 +1,11 @@
 // Where the arm is, what it carries, what it could reach.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
+#include "hal/sim/ur_controller/rtde_table.hpp"
 #include "hal/sim/ur_controller/script/builtins.hpp"
 #include "hal/sim/ur_controller/script/inverse_pose.hpp"
 #include "hal/sim/ur_controller/steady_readings.hpp"
@@ -100,6 +104,26 @@ void set_gravity(Call& c) {
   if (c.ok()) c.controller().set_gravity(gravity_m_s2);
 }
 
+/// Over an input of an RTDE client, renewed so often (Hz): else the program is paused, stopped, or goes on.
+void set_watchdog(Call& c) {
+  using Action = RtdeWatchdogs::Action;
+  const std::string name = c.text(0);
+  std::string action = c.text(2);
+  const double frequency_hz = c.number(1);
+  std::ranges::transform(action, action.begin(), [](unsigned char ch) { return static_cast<char>(std::tolower(ch)); });
+  const ControllerIdentity& identity = c.controller().identity();
+  const RtdeInput input = find_rtde_input(name, identity);
+  if (input.read == nullptr) c.fail(fmt::format("rtde_set_watchdog: no input {}", name));
+  if (!(frequency_hz > 0)) c.fail("rtde_set_watchdog: the frequency must be positive");
+  if (action != "ignore" && action != "pause" && action != "stop") {
+    c.fail("rtde_set_watchdog: the action is \"ignore\", \"pause\" or \"stop\"");
+  }
+  if (!c.ok()) return;
+  const auto period_cycles = static_cast<std::uint64_t>(std::min(identity.frequency_hz() / frequency_hz, 1e9));
+  const Action asked = action == "ignore" ? Action::kIgnore : action == "pause" ? Action::kPause : Action::kStop;
+  c.controller().watchdogs().set({input.row, input.index}, period_cycles, asked, c.robot().control_step);
+}
+
 void nothing(Call&) {}
 
 constexpr Builtin kTable[] = {
@@ -136,7 +160,7 @@ constexpr Builtin kTable[] = {
     {"is_within_safety_limits", "x,qnear=[]", within_limits},
     {"position_deviation_warning", "enabled,threshold=0.8", nothing},
     {"reset_revolution_counter", "qNear=[]", nothing},
-    {"rtde_set_watchdog", "variable_name,min_frequency,action=\"pause\"", nothing},
+    {"rtde_set_watchdog", "variable_name,min_frequency,action=\"pause\"", set_watchdog},
     {"set_gravity", "d", set_gravity},
     {"set_payload", "m,cog=[],inertia=[]", set_payload},
     {"set_payload_cog", "cog", set_payload_center},

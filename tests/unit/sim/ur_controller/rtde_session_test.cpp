@@ -248,6 +248,49 @@ TEST_CASE("data of a wrong size or number change nothing and are answered in wor
   CHECK(client.send(rtde('M', std::string("\5hello\2me\3", 10))).empty());
 }
 
+TEST_CASE("a watchdog over an input pauses or stops the program that set it", "[ur]") {
+  const auto [action, after] = GENERATE(table<std::string, RuntimeState>({{"\"pause\"", RuntimeState::kPaused},
+                                                                          {"\"STOP\"", RuntimeState::kStopped},
+                                                                          {"\"ignore\"", RuntimeState::kPlaying}}));
+  UrRobot robot("ur5");
+  Client client(robot);
+  client.protocol_2();
+  static_cast<void>(client.outputs(10, "timestamp"));
+  CHECK(client.inputs("input_int_register_0,input_int_register_1") == with_id(1, "INT32,INT32"));
+  client.start();
+  Session& primary = robot.robot.open(Port::kPrimary);
+  primary.receive(std::string("def watched():\n  rtde_set_watchdog(\"input_int_register_0\", 10, ") + action +
+                  ")\n  while True:\n    sync()\n  end\nend\n");
+  for (int i = 0; i < 20; ++i) {
+    client.session.receive(rtde('U', std::string("\1\0\0\0\0\0\0\0\0", 9)));
+    robot.run(0.09);
+    REQUIRE(robot.state().runtime == RuntimeState::kPlaying);
+  }
+  robot.run(0.2);
+  CHECK(robot.state().runtime == after);
+  if (after != RuntimeState::kPaused) return;
+  // Time in the pause does not count; without a renewal it is paused again.
+  robot.run(5);
+  CHECK(robot.dashboard("play") == "Starting program");
+  robot.run(0.09);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  robot.run(0.3);
+  CHECK(robot.state().runtime == RuntimeState::kPaused);
+}
+
+TEST_CASE("a watchdog ends with its program, and needs an input that there is", "[ur]") {
+  UrRobot robot("ur5e");
+  Session& primary = robot.robot.open(Port::kPrimary);
+  primary.receive("def first():\n  rtde_set_watchdog(\"input_int_register_0\", 10, \"stop\")\nend\n");
+  robot.run(0.05);
+  primary.receive("def second():\n  while True:\n    sync()\n  end\nend\n");
+  robot.run(2);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  primary.receive("def third():\n  rtde_set_watchdog(\"no_such_input\", 10)\n  sleep(60)\nend\n");
+  robot.run(1);
+  CHECK_FALSE(robot.state().program_running());
+}
+
 TEST_CASE("packages may be cut anywhere", "[ur]") {
   UrRobot robot("ur5");
   Client client(robot);
