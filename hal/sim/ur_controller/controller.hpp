@@ -67,8 +67,11 @@ class Controller {
 
   /// Puts a standing arm elsewhere.
   void place(const JointVector& at_rad);
-  /// Somebody holds the pendant's freedrive button and leads the arm there. False where the arm may not move, or a
-  /// program moves it.
+  /// Freedrive without its button, as `freedrive_mode()` asks for: hands may lead the arm, no path can be followed. On
+  /// where the arm may move; off holds the arm. Whatever stops the program ends it.
+  void set_teach_mode(bool on);
+  /// Somebody leads the arm there: by the pendant's freedrive button, or without it in teach mode. False where the arm
+  /// may not move, or a program moves it.
   bool lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2);
   /// What its encoders show differs from the joints by noise of this sigma, another in each cycle; without this call by
   /// nothing.

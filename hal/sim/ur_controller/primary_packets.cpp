@@ -42,7 +42,7 @@ void mode_data(const Controller& controller, WireWriter& wire) {
   wire.flag(s.program_running());
   wire.flag(s.runtime == RuntimeState::kPaused);
   wire.i8(static_cast<std::int8_t>(s.robot_mode));
-  wire.u8(0);  // control mode: position
+  wire.u8(s.control_mode());
   wire.f64(s.speed_slider);
   wire.f64(s.speed_scaling);
   wire.f64(1);  // limit of the slider
