@@ -255,6 +255,11 @@ std::string event_message(const ControllerEvent& event) {
         wire.u8(0);
         wire.text(event.text);
         break;
+      case Kind::kLabel:
+        wire.u8(1);
+        wire.i32(event.code);
+        wire.text(event.text);
+        break;
       case Kind::kPopup:
         wire.u8(2);
         popup_message(event, wire);

@@ -91,6 +91,12 @@ void set_tcp(Call& c) {
   if (c.ok()) c.controller().set_tcp_offset(offset);
 }
 
+void tool_accelerometer(Call& c) {
+  List list;
+  for (const double value : tool_acceleration(c.robot())) list.emplace_back(value);
+  c.answer(std::move(list));
+}
+
 void joint_temperature(Call& c) { c.answer(kJointTemperatures_c[static_cast<std::size_t>(c.integer(0, 0, 5))]); }
 
 /// At the TCP, as `external_force_torque` says (N).
@@ -149,6 +155,7 @@ constexpr Builtin kTable[] = {
     {"get_target_joint_speeds", "", joint_speeds},
     {"get_target_payload", "", [](Call& c) { c.answer(c.robot().payload.mass_kg); }},
     {"get_target_payload_cog", "", payload_center},
+    {"get_target_payload_inertia", "", [](Call& c) { c.answer(list_of(c.robot().payload.inertia_kg_m2)); }},
     {"get_target_tcp_pose", "", tcp_pose},
     {"get_target_tcp_pose_along_path", "", tcp_pose},
     {"get_target_tcp_speed_along_path", "", tcp_speed},
@@ -156,6 +163,8 @@ constexpr Builtin kTable[] = {
     {"get_target_waypoint", "", tcp_pose},
     {"get_tcp_force", "", tcp_force},
     {"get_tcp_offset", "", [](Call& c) { c.answer(PoseValue{c.robot().tcp_offset}); }},
+    {"get_tool_accelerometer_reading", "", tool_accelerometer},
+    {"get_tool_current", "", [](Call& c) { c.answer(0.0); }},
     {"is_steady", "", [](Call& c) { c.answer(c.controller().motion().standing()); }},
     {"is_within_safety_limits", "x,qnear=[]", within_limits},
     {"position_deviation_warning", "enabled,threshold=0.8", nothing},
