@@ -157,6 +157,7 @@ constexpr Builtin kTable[] = {
     {"set_input_actions_to_default", "", nothing},
     {"set_runstate_configurable_digital_output_to_value", "outputId,state", nothing},
     {"set_runstate_gp_boolean_output_to_value", "outputId,state", nothing},
+    {"set_runstate_outputs", "outputs", nothing},
     {"set_runstate_standard_analog_output_to_value", "outputId,state", nothing},
     {"set_runstate_standard_digital_output_to_value", "outputId,state", nothing},
     {"set_runstate_tool_digital_output_to_value", "outputId,state", nothing},

@@ -169,8 +169,26 @@ void begin_freedrive(Call& c) {
 void end_freedrive(Call& c) { c.controller().set_teach_mode(false); }
 
 void nothing(Call&) {}
+void no_ticks(Call& c) { c.answer(0.0); }
 
 constexpr Builtin kTable[] = {
+    {"conveyor_pulse_decode", "type,A,B", nothing},
+    {"encoder_enable_pulse_decode", "encoder_index,decoder_type,A,B", nothing},
+    {"encoder_enable_set_tick_count", "encoder_index,range_id", nothing},
+    {"encoder_get_tick_count", "encoder_index", no_ticks},
+    {"encoder_set_tick_count", "encoder_index,count", nothing},
+    {"encoder_unwind_delta_tick_count", "encoder_index,delta_tick_count", [](Call& c) { c.answer(c.number(1)); }},
+    {"get_conveyor_tick_count", "", no_ticks},
+    {"path_offset_disable", "a=20", nothing},
+    {"path_offset_enable", "", nothing},
+    {"path_offset_set", "offset,type=0", nothing},
+    {"path_offset_set_alpha_filter", "alpha", nothing},
+    {"path_offset_set_max_offset", "transLimit,rotLimit", nothing},
+    {"set_conveyor_tick_count", "tick_count,absolute_encoder_resolution=0", nothing},
+    {"set_safety_mode_transition_hardness", "type", nothing},
+    {"stop_conveyor_tracking", "a=20", nothing},
+    {"track_conveyor_circular", "center,ticks_per_revolution,rotate_tool=False,encoder_index=0", nothing},
+    {"track_conveyor_linear", "direction,ticks_per_meter,encoder_index=0", nothing},
     {"enable_external_ft_sensor", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
     {"end_force_mode", "", nothing},
     {"end_freedrive_mode", "", end_freedrive},

@@ -301,7 +301,7 @@ class Compiler {
     skip_line_ends();
   }
 
-  /// $ 3 "Move": where in a program of the pendant's the lines below come from.
+  /// $ 3 "Move", and with it "breakAfter" or the like: where in a program of the pendant's the lines below come from.
   void label() {
     const Token where = now();
     advance();
@@ -311,6 +311,7 @@ class Compiler {
     if (now().kind != Kind::kText) return fail_here();
     constant(now().text);
     advance();
+    if (now().kind == Kind::kText) advance();
     emit_at(where, Op::kCallBuiltin, find_builtin("$"), 2);
     emit(Op::kPop);
     expect_line_end();

@@ -414,10 +414,35 @@ TEST_CASE("in freedrive no path is followed, and what stops the program ends it"
   CHECK_FALSE(robot.state().teach_mode);
 }
 
+TEST_CASE("what this robot has not does nothing, and a program with it runs", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def p():
+  track_conveyor_linear(p[1, 0, 0, 0, 0, 0], 500.0)
+  textmsg(encoder_get_tick_count(0))
+  stop_conveyor_tracking(15)
+  path_offset_enable()
+  path_offset_set([0, 0, 0.01, 0, 0, 0], 3)
+  path_offset_disable()
+  set_tool_communication(True, 115200, 1, 2, 1.0, 3.5)
+  set_standard_digital_input_action(0, "freedrive")
+  set_runstate_standard_digital_output_to_value(1, 3)
+  set_runstate_outputs([])
+  set_analog_inputrange(2, 0)
+  set_input_actions_to_default()
+  force_mode(p[0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 5, 0, 0, 0], 2, [0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
+  end_force_mode()
+  textmsg("done")
+end
+)");
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"0", "done"});
+}
+
 TEST_CASE("programs of the pendant have labels, which the primary interface tells", "[ur][script]") {
   ScriptRobot robot;
   robot.primary.receive(
-      "def p():\n  $ 1 \"Robot Program\"\n  if True:\n    $ 2 \"Set\"\n    textmsg(\"set\")\n  end\nend\n");
+      "def p():\n  $ 1 \"Robot Program\"\n  if True:\n    $ 2 \"Set\" \"breakAfter\"\n    textmsg(\"set\")\n  "
+      "end\nend\n");
   robot.run(0.5);
   std::vector<std::string> labels;
   for (const UrPacket& packet : take_packets(robot.primary.output())) {
