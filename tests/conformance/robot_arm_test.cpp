@@ -44,7 +44,7 @@ struct Ur {
   Ur() : arm("ur5") {
     arm.ur.robot.controller().place(kStart);
     arm.at(at(0.1), [](test::DrivenUr& a) { a.play(); });
-    arm.at(at(5), [](test::DrivenUr& a) { REQUIRE(a.ur.dashboard("pause") == "Pausing program"); });
+    arm.at(at(5), [](test::DrivenUr& a) { REQUIRE(a.ur.robot.programs().pause()); });
     arm.at(at(6), [](test::DrivenUr& a) { a.play(); });
     arm.at(at(9), [](test::DrivenUr& a) { a.ur.robot.controller().protective_stop("a test"); });
   }

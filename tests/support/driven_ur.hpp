@@ -25,7 +25,7 @@ class DrivenUr final : public hal::RobotArm {
   }
 
   void at(Instant when, std::function<void(DrivenUr&)> what) { script_[when] = std::move(what); }
-  void play() { REQUIRE(ur.dashboard("play") == "Starting program"); }
+  void play() { REQUIRE(ur.robot.programs().play()); }
 
   /// Lets time pass in steps of the driver's own; what is reported is kept for poll().
   void run_to(Instant now) {

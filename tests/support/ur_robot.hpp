@@ -19,11 +19,12 @@ struct UrRobot {
     const auto cycles = static_cast<int>(s * robot.controller().identity().frequency_hz() + 0.5);
     for (int i = 0; i < cycles; ++i) robot.step();
   }
-  /// One line to the dashboard, and its answer without the line end.
+  /// One line to the dashboard, and its answer without the line end: time passes until it comes.
   std::string dashboard(const std::string& line) {
     sim::ur::Session& session = robot.open(sim::ur::Port::kDashboard);
     session.output().clear();
     session.receive(line + "\n");
+    for (int i = 0; i < 5000 && session.output().empty(); ++i) robot.step();
     std::string answer = session.output();
     robot.close(session);
     REQUIRE(!answer.empty());

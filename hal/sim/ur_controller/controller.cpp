@@ -136,6 +136,7 @@ void Controller::reboot() {
   power_off();
   const ControllerState before = state_;
   state_ = {};
+  watchdogs_.clear();
   state_.control_step = before.control_step;
   state_.safety_mode = emergency_;
   state_.runtime = RuntimeState::kStopped;
@@ -190,6 +191,7 @@ void Controller::pause() {
 
 void Controller::stop() {
   resume_after_safeguard_ = false;
+  set_teach_mode(false);
   if (state_.runtime == RuntimeState::kStopped) return;
   state_.runtime = RuntimeState::kStopping;
   static_cast<void>(motion_.stop(kProgramStop_rad_s2));
@@ -201,10 +203,14 @@ void Controller::place(const JointVector& at_rad) {
   report_arm();
 }
 
+void Controller::set_teach_mode(bool on) {
+  if (on && !can_play()) return;
+  if (state_.teach_mode && !on && motion_.in_hand()) static_cast<void>(motion_.stop(kProgramStop_rad_s2));
+  state_.teach_mode = on;
+}
+
 bool Controller::lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2) {
-  const SafetyMode safety = state_.safety_mode;
-  const bool safe = safety == SafetyMode::kNormal || safety == SafetyMode::kReduced;
-  if (!safe || state_.robot_mode != RobotMode::kRunning || !to_rad.all_finite()) return false;
+  if (!can_play() || !to_rad.all_finite()) return false;
   return motion_.lead(to_rad, speed_rad_s, acceleration_rad_s2);
 }
 
@@ -304,7 +310,7 @@ void Controller::step() {
   state_.speed_scaling = state_.robot_mode == RobotMode::kRunning ? motion_.scale() : 0;
   advance_runtime();
   report_arm();
-  state_.freedrive = motion_.in_hand();
+  state_.freedrive = motion_.in_hand() && !state_.teach_mode;
 }
 
 }  // namespace firstlook::sim::ur

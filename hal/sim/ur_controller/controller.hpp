@@ -8,6 +8,7 @@
 #include "hal/sim/ur_controller/controller_events.hpp"
 #include "hal/sim/ur_controller/controller_identity.hpp"
 #include "hal/sim/ur_controller/controller_state.hpp"
+#include "hal/sim/ur_controller/rtde_watchdogs.hpp"
 
 namespace firstlook::sim::ur {
 
@@ -66,8 +67,11 @@ class Controller {
 
   /// Puts a standing arm elsewhere.
   void place(const JointVector& at_rad);
-  /// Somebody holds the pendant's freedrive button and leads the arm there. False where the arm may not move, or a
-  /// program moves it.
+  /// Freedrive without its button, as `freedrive_mode()` asks for: hands may lead the arm, no path can be followed. On
+  /// where the arm may move; off holds the arm. Whatever stops the program ends it.
+  void set_teach_mode(bool on);
+  /// Somebody leads the arm there: by the pendant's freedrive button, or without it in teach mode. False where the arm
+  /// may not move, or a program moves it.
   bool lead(const JointVector& to_rad, double speed_rad_s, double acceleration_rad_s2);
   /// What its encoders show differs from the joints by noise of this sigma, another in each cycle; without this call by
   /// nothing.
@@ -78,6 +82,7 @@ class Controller {
   [[nodiscard]] const ArmMotion& motion() const { return motion_; }
   [[nodiscard]] InputsOutputs& io() { return state_.io; }
   [[nodiscard]] Registers& inputs() { return state_.inputs; }
+  [[nodiscard]] RtdeWatchdogs& watchdogs() { return watchdogs_; }
   [[nodiscard]] Registers& outputs() { return state_.outputs; }
   void set_speed_slider(double fraction);  ///< clamped to 0..1; not finite: ignored
   void set_payload(const Payload& payload) { state_.payload = payload; }
@@ -103,6 +108,7 @@ class Controller {
   ArmMotion motion_;
   ControllerState state_;
   EventLog events_;
+  RtdeWatchdogs watchdogs_;
   double clock_s_;  ///< that its clock showed in cycle `clock_from_`
   std::uint64_t clock_from_ = 0;
   std::uint64_t mode_until_ = 0;  ///< the cycle in which kPowerOn, or the release of brakes, ends; 0: nothing under way

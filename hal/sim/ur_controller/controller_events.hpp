@@ -10,11 +10,11 @@ namespace firstlook::sim::ur {
 
 /// One message of the primary interface, before it is packed.
 struct ControllerEvent {
-  enum class Kind : std::uint8_t { kText, kKey, kPopup, kSafetyMode, kErrorCode, kRuntimeException };
+  enum class Kind : std::uint8_t { kText, kLabel, kKey, kPopup, kSafetyMode, kErrorCode, kRuntimeException };
 
   Kind kind = Kind::kText;
   double timestamp_s = 0;
-  std::int32_t code = 0;      ///< of a key or an error; the line of a runtime exception
+  std::int32_t code = 0;      ///< of a key, a label or an error; the line of a runtime exception
   std::int32_t argument = 0;  ///< of an error; the column of a runtime exception; the safety mode
   bool warning = false, error = false;
   std::string title = {}, text = {};

@@ -75,10 +75,13 @@ struct ControllerState {
   InputsOutputs io;
   Registers inputs, outputs;
   bool freedrive = false;         ///< its button is pressed
+  bool teach_mode = false;        ///< a program, or a command, has put the arm into freedrive: no button is needed
   std::uint32_t script_line = 0;  ///< that has the arm under its control; 0 for none
 
   [[nodiscard]] bool powered() const { return robot_mode == RobotMode::kIdle || robot_mode == RobotMode::kRunning; }
   [[nodiscard]] bool program_running() const { return runtime != RuntimeState::kStopped; }
+  /// What the primary interface calls control mode: 0 position, 1 teach.
+  [[nodiscard]] std::uint8_t control_mode() const { return freedrive || teach_mode ? 1 : 0; }
   [[nodiscard]] bool emergency_stopped() const {
     return safety_mode == SafetyMode::kRobotEmergencyStop || safety_mode == SafetyMode::kSystemEmergencyStop;
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <utility>
 
 namespace firstlook::sim::ur {
 namespace {
@@ -29,9 +30,7 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-std::string failed(bool done, std::string_view reply, std::string_view command) {
-  return done ? std::string(reply) : fmt::format("Failed to execute: {}", command);
-}
+std::string failed(std::string_view command) { return fmt::format("Failed to execute: {}", command); }
 
 std::string load(DashboardSession& s, Argument name) {
   return fmt::format("{}: {}", s.programs().load(name) ? "Loading program" : "File not found", name);
@@ -41,9 +40,33 @@ std::string load_installation(DashboardSession&, Argument name) {
   return fmt::format("{}: {}", name.ends_with(kInstallation) ? "Loading installation" : "File not found", name);
 }
 
-std::string play(DashboardSession& s, Argument) { return failed(s.programs().play(), "Starting program", "play"); }
-std::string stop(DashboardSession& s, Argument) { return failed(s.programs().stop(), "Stopped", "stop"); }
-std::string pause(DashboardSession& s, Argument) { return failed(s.programs().pause(), "Pausing program", "pause"); }
+// Since 3.3 these three are answered when it has happened.
+std::string play(DashboardSession& s, Argument) {
+  if (!s.programs().play()) return failed("play");
+  s.answer_when([](DashboardSession& session) -> std::optional<std::string> {
+    if (session.programs().starting()) return std::nullopt;
+    return session.programs().start_failed() ? failed("play") : "Starting program";
+  });
+  return {};
+}
+
+std::string stop(DashboardSession& s, Argument) {
+  if (!s.programs().stop()) return failed("stop");
+  s.answer_when([](DashboardSession& session) -> std::optional<std::string> {
+    if (session.controller().state().program_running()) return std::nullopt;
+    return "Stopped";
+  });
+  return {};
+}
+
+std::string pause(DashboardSession& s, Argument) {
+  if (!s.programs().pause()) return failed("pause");
+  s.answer_when([](DashboardSession& session) -> std::optional<std::string> {
+    if (session.controller().state().runtime == RuntimeState::kPausing) return std::nullopt;
+    return "Pausing program";
+  });
+  return {};
+}
 
 std::string quit(DashboardSession& s, Argument) {
   s.disconnect();
@@ -154,8 +177,9 @@ std::string set_operational_mode(DashboardSession& s, Argument mode) {
 std::string get_operational_mode(DashboardSession& s, Argument) { return s.dashboard().operational_mode; }
 
 std::string clear_operational_mode(DashboardSession& s, Argument) {
-  s.dashboard().operational_mode = "NONE";
-  return "No longer controlling the operational mode. Current operational mode: 'NONE'.";
+  const std::string mode = std::exchange(s.dashboard().operational_mode, "NONE");
+  return fmt::format("No longer controlling the operational mode. Current operational mode: '{}'.",
+                     mode == "NONE" ? "MANUAL" : mode);
 }
 
 std::string set_user_role(DashboardSession& s, Argument role) {
@@ -172,7 +196,7 @@ std::string get_user_role(DashboardSession& s, Argument) { return s.dashboard().
 
 std::string flight_report(DashboardSession& s, Argument kind) {
   const std::string wanted = lower(kind);
-  if (wanted != "controller" && wanted != "software" && wanted != "system") {
+  if (!wanted.empty() && wanted != "controller" && wanted != "software" && wanted != "system") {
     return fmt::format("Error: no report type '{}'", kind);
   }
   return fmt::format("Flight Report generated with id: {}", ++s.dashboard().flight_reports);

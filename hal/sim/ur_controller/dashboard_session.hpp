@@ -1,6 +1,9 @@
 /// A client of the dashboard server (29999): one line in, one line out.
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "hal/sim/ur_controller/programs.hpp"
 #include "hal/sim/ur_controller/session.hpp"
 
@@ -28,14 +31,22 @@ class DashboardSession final : public Session {
   [[nodiscard]] Programs& programs() { return programs_; }
   [[nodiscard]] DashboardState& dashboard() { return dashboard_; }
   void disconnect() { end(); }
+  /// A command whose reply comes when it has been carried out: asked each cycle, until it has one. Lines that come
+  /// meanwhile wait.
+  using Reply = std::optional<std::string> (*)(DashboardSession& session);
+  void answer_when(Reply reply) { pending_ = reply; }
+
+  void on_cycle() override;
 
  private:
+  void answer_lines();
   void answer(std::string_view line);
 
   Controller& controller_;
   Programs& programs_;
   DashboardState& dashboard_;
   std::string received_;
+  Reply pending_ = nullptr;
 };
 
 }  // namespace firstlook::sim::ur

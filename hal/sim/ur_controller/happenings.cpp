@@ -20,7 +20,7 @@ constexpr double kNone = 0;
 
 // Buttons of the pendant, safety inputs, faults, network.
 constexpr Row kRows[] = {
-    {"play", false, kNone, kNone, "Play; loads external_control.urp where nothing is loaded",
+    {"play", false, kNone, kNone, "Play: goes on, or begins; loads external_control.urp where nothing is loaded",
      [](SimulatedUr& r, double) { press_play(r); }},
     {"pause", false, kNone, kNone, "Pause", [](SimulatedUr& r, double) { static_cast<void>(r.programs().pause()); }},
     {"stop", false, kNone, kNone, "Stop", [](SimulatedUr& r, double) { static_cast<void>(r.programs().stop()); }},
@@ -151,7 +151,8 @@ Timetable timetable_of(const ControllerScript& script) {
 void press_play(SimulatedUr& robot) {
   constexpr std::string_view kProgram = "external_control.urp";
   Programs& programs = robot.programs();
-  if (programs.loaded_path().empty() && !programs.load(kProgram)) return;
+  const bool goes_on = robot.controller().state().runtime == RuntimeState::kPaused;
+  if (!goes_on && programs.loaded_path().empty() && !programs.load(kProgram)) return;
   static_cast<void>(programs.play());
 }
 

@@ -42,7 +42,7 @@ void mode_data(const Controller& controller, WireWriter& wire) {
   wire.flag(s.program_running());
   wire.flag(s.runtime == RuntimeState::kPaused);
   wire.i8(static_cast<std::int8_t>(s.robot_mode));
-  wire.u8(0);  // control mode: position
+  wire.u8(s.control_mode());
   wire.f64(s.speed_slider);
   wire.f64(s.speed_scaling);
   wire.f64(1);  // limit of the slider
@@ -253,6 +253,11 @@ std::string event_message(const ControllerEvent& event) {
     switch (event.kind) {
       case Kind::kText:
         wire.u8(0);
+        wire.text(event.text);
+        break;
+      case Kind::kLabel:
+        wire.u8(1);
+        wire.i32(event.code);
         wire.text(event.text);
         break;
       case Kind::kPopup:

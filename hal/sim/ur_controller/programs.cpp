@@ -41,6 +41,19 @@ void Programs::end_program() {
   controller_.tell({.kind = Kind::kKey, .title = "PROGRAM_XXX_STOPPED", .text = program_->code().name});
   program_.reset();
   controller_.set_script_line(0);
+  controller_.watchdogs().clear();
+}
+
+void Programs::follow_watchdogs() {
+  RtdeWatchdogs& watchdogs = controller_.watchdogs();
+  const std::uint64_t now = controller_.state().control_step;
+  if (program_ == nullptr || !controller_.playing()) return watchdogs.hold(now);
+  const auto late = watchdogs.late(now);
+  if (!late || *late == RtdeWatchdogs::Action::kIgnore) return;
+  controller_.tell(
+      {.kind = Kind::kErrorCode, .warning = true, .text = "RTDE watchdog: an input was not renewed in time"});
+  if (*late == RtdeWatchdogs::Action::kPause) return controller_.pause();
+  controller_.stop();
 }
 
 void Programs::begin_pending() {
@@ -63,8 +76,9 @@ void Programs::follow_request() {
   if (state == ProgramRequest::State::kWaiting) return;
   const std::unique_ptr<ProgramRequest> request = std::move(request_);
   if (state == ProgramRequest::State::kAnswered) {
-    static_cast<void>(start(request->program()));
+    start_failed_ = !start(request->program());
   } else {
+    start_failed_ = true;
     controller_.tell({.kind = Kind::kPopup,
                       .error = true,
                       .title = "External Control",
@@ -74,6 +88,7 @@ void Programs::follow_request() {
 
 void Programs::step() {
   follow_request();
+  follow_watchdogs();
   const RuntimeState runtime = controller_.state().runtime;
   if (runtime == RuntimeState::kStopping || runtime == RuntimeState::kStopped) end_program();
   if (pending_ != nullptr && program_ == nullptr && runtime == RuntimeState::kStopped) {
@@ -81,6 +96,7 @@ void Programs::step() {
       begin_pending();
     } else {
       pending_.reset();
+      start_failed_ = true;
     }
   }
   if (program_ != nullptr && controller_.playing()) {
@@ -124,7 +140,10 @@ void Programs::submit(const std::string& script) {
 }
 
 bool Programs::load(std::string_view name) {
-  if (name.starts_with(kFolder)) name.remove_prefix(kFolder.size());
+  // A simulator of UR's has the folder elsewhere: "/ursim/programs/".
+  if (const std::size_t folder = name.find(kFolder); folder != std::string_view::npos) {
+    name.remove_prefix(folder + kFolder.size());
+  }
   for (const StoredProgram& program : stored_) {
     if (program.name != name) continue;
     static_cast<void>(stop());
@@ -134,7 +153,12 @@ bool Programs::load(std::string_view name) {
   return false;
 }
 
+bool Programs::starting() const {
+  return request_ != nullptr || pending_ != nullptr || controller_.state().runtime == RuntimeState::kResuming;
+}
+
 bool Programs::play() {
+  start_failed_ = false;
   if (!controller_.can_play()) return false;
   switch (controller_.state().runtime) {
     case RuntimeState::kPaused:

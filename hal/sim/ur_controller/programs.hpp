@@ -39,6 +39,11 @@ class Programs {
   [[nodiscard]] bool pause();
   [[nodiscard]] bool stop();
 
+  /// After `play`: its program has not begun yet, or not gone on.
+  [[nodiscard]] bool starting() const;
+  /// And it never did.
+  [[nodiscard]] bool start_failed() const { return start_failed_; }
+
   /// URScript that came over a script port: it replaces what runs; a `sec` runs beside it. What does not compile leaves
   /// the running program alone and is told as a runtime exception.
   void submit(const std::string& script);
@@ -52,6 +57,7 @@ class Programs {
   [[nodiscard]] bool start(const std::string& script);
   [[nodiscard]] bool start_loaded();
   void follow_request();
+  void follow_watchdogs();
   void begin_pending();
   void end_program();
   void tell_error(const script::ScriptError& error);
@@ -60,6 +66,7 @@ class Programs {
   std::vector<StoredProgram> stored_;
   script::Sockets* sockets_ = nullptr;
   const StoredProgram* loaded_ = nullptr;
+  bool start_failed_ = false;
   std::unique_ptr<ProgramRequest> request_;
   std::unique_ptr<script::Machine> program_;
   std::unique_ptr<script::Machine> pending_;  ///< begins when the arm stands

@@ -9,7 +9,8 @@ namespace firstlook::sim::ur {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 3;
-constexpr std::size_t kRecipesMax = 255;  // their number is a byte, and 0 means none
+constexpr std::size_t kRecipesMax = 255;  // of inputs: their number is a byte, and 0 means none
+constexpr char kOutputRecipe = '\1';
 constexpr double kProtocol1Frequency_hz = 125;
 constexpr std::uint8_t kErrorLevel = 1;  // exception, error, warning, info
 
@@ -136,12 +137,10 @@ void RtdeSession::set_up_outputs(std::string_view payload) {
     if (field.write != nullptr) bytes += bytes_of(field.type);
     recipe.fields.push_back(field);
   }
-  if (protocol_ == 1) output_recipes_.clear();  // it knows one recipe, without a number
-  valid = valid && bytes <= UINT16_MAX && output_recipes_.size() < kRecipesMax;
-  if (valid) output_recipes_.push_back(std::move(recipe));
+  valid = valid && bytes <= UINT16_MAX;
+  if (valid) output_recipe_ = std::move(recipe);
   if (protocol_ == 1) return send('O', types);
-  const char number = valid ? static_cast<char>(output_recipes_.size()) : '\0';
-  send('O', std::string(1, number) + types);
+  send('O', std::string(1, valid ? kOutputRecipe : '\0') + types);
 }
 
 void RtdeSession::set_up_inputs(std::string_view payload) {
@@ -165,7 +164,7 @@ void RtdeSession::set_up_inputs(std::string_view payload) {
 }
 
 void RtdeSession::start(bool running) {
-  const bool accepted = !running || !output_recipes_.empty() || !input_recipes_.empty();
+  const bool accepted = !running || output_recipe_;
   if (accepted) running_ = running;
   send(running ? 'S' : 'P', std::string(1, accepted ? '\1' : '\0'));
 }
@@ -183,7 +182,10 @@ void RtdeSession::take_data(std::string_view payload) {
     return send_text(fmt::format("input recipe {}: {} bytes instead of {}", number, payload.size(), bytes));
   }
   RtdeInputs inputs;
-  for (const RtdeInput& field : recipe) field.read(controller_, inputs, field.index, wire);
+  for (const RtdeInput& field : recipe) {
+    field.read(controller_, inputs, field.index, wire);
+    controller_.watchdogs().renew({field.row, field.index}, controller_.state().control_step);
+  }
   apply_rtde_inputs(inputs, controller_);
 }
 
@@ -196,18 +198,14 @@ void RtdeSession::take_text(std::string_view payload) {
 }
 
 void RtdeSession::on_cycle() {
-  if (!running_) return;
-  for (std::size_t i = 0; i < output_recipes_.size(); ++i) {
-    const OutputRecipe& recipe = output_recipes_[i];
-    if (controller_.state().control_step % recipe.every_cycles != 0) continue;
-    WireWriter wire(output());
-    const std::size_t begin = wire.size();
-    wire.u16(0);
-    wire.u8('U');
-    if (protocol_ != 1) wire.u8(static_cast<std::uint8_t>(i + 1));
-    for (const RtdeOutput& field : recipe.fields) field.write(controller_, field.index, wire);
-    wire.patch_u16(begin, static_cast<std::uint16_t>(wire.size() - begin));
-  }
+  if (!running_ || !output_recipe_ || controller_.state().control_step % output_recipe_->every_cycles != 0) return;
+  WireWriter wire(output());
+  const std::size_t begin = wire.size();
+  wire.u16(0);
+  wire.u8('U');
+  if (protocol_ != 1) wire.u8(static_cast<std::uint8_t>(kOutputRecipe));
+  for (const RtdeOutput& field : output_recipe_->fields) field.write(controller_, field.index, wire);
+  wire.patch_u16(begin, static_cast<std::uint16_t>(wire.size() - begin));
 }
 
 }  // namespace firstlook::sim::ur

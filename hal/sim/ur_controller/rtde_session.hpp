@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -61,8 +62,8 @@ class RtdeSession final : public Session {
   std::string received_;
   int protocol_ = 1;
   bool running_ = false;
-  std::vector<OutputRecipe> output_recipes_;  ///< number i + 1
-  std::vector<InputRecipe> input_recipes_;
+  std::optional<OutputRecipe> output_recipe_;  ///< one for each client: the latest takes the place of the one before
+  std::vector<InputRecipe> input_recipes_;     ///< number i + 1
 };
 
 }  // namespace firstlook::sim::ur

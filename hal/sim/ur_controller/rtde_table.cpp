@@ -151,7 +151,7 @@ constexpr OutputRow kOutputs[] = {
     {"joint_position_deviation_ratio", T::kDouble, kESeriesOnly, none},
     {"collision_detection_ratio", T::kDouble, kESeriesOnly, none},
     {"encoder*_raw", T::kInt32, kESeriesOnly, none_i32, 0, 1},
-    {"tcp_offset", T::kVector6d, kESeriesOnly, [](C c, int, W w) { w.f64s(c.state().tcp_offset); }},
+    {"tcp_offset", T::kVector6d, {{3, 12}, {5, 5, 1}}, [](C c, int, W w) { w.f64s(c.state().tcp_offset); }},
     {"target_gravity", T::kVector3d, kESeriesOnly, [](C c, int, W w) { w.f64s(c.state().gravity_m_s2); }},
     {"time_scale_source", T::kInt32, kESeriesOnly, none_i32},
 };

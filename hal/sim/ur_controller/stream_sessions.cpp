@@ -1,5 +1,7 @@
 #include "hal/sim/ur_controller/stream_sessions.hpp"
 
+#include <charconv>
+
 #include "hal/sim/ur_controller/primary_packets.hpp"
 #include "hal/sim/ur_controller/realtime_packet.hpp"
 
@@ -7,6 +9,7 @@ namespace firstlook::sim::ur {
 namespace {
 
 constexpr std::uint64_t kStateFrequency_hz = 10;
+constexpr std::string_view kSetSpeed = "set speed ";  // and a fraction
 
 std::string_view first_line(std::string_view program) {
   program = program.substr(0, program.find('\n'));
@@ -37,7 +40,17 @@ void ScriptSession::run(const std::string& program) {
   } else if (command == "power off") {
     controller_.power_off();
   } else if (command == "set robotmode run") {
+    controller_.set_teach_mode(false);
     controller_.release_brakes();
+  } else if (command == "set robotmode freedrive") {
+    controller_.set_teach_mode(true);
+  } else if (command.starts_with(kSetSpeed)) {
+    double fraction = 0;
+    const std::string_view text = command.substr(kSetSpeed.size());
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), fraction);
+    if (error == std::errc{} && end == text.data() + text.size()) controller_.set_speed_slider(fraction);
+  } else if (command == "set real" || command == "set sim") {
+    // The arm is a simulated one in either.
   } else if (command == "set unlock protective stop") {
     static_cast<void>(controller_.unlock_protective_stop());
   } else if (command == "stop program") {

@@ -110,7 +110,7 @@ TEST_CASE("a pause withdraws the segment; after it nothing moves until it is ask
   test::DrivenUr& arm = playing.arm;
   playing.move(1, 2);
   arm.run(1);
-  REQUIRE(arm.ur.dashboard("pause") == "Pausing program");
+  REQUIRE(arm.ur.robot.programs().pause());
   arm.run(0.3);
   CHECK_FALSE(arm.last.program_running);
   CHECK_FALSE(arm.last.moving);
@@ -134,7 +134,7 @@ TEST_CASE("Stop on the pendant ends the motion, and a new Play begins anew", "[u
   test::DrivenUr& arm = playing.arm;
   playing.move(1, 2);
   arm.run(1);
-  REQUIRE(arm.ur.dashboard("stop") == "Stopped");
+  REQUIRE(arm.ur.robot.programs().stop());
   arm.run(0.5);
   CHECK_FALSE(arm.last.program_running);
   CHECK_FALSE(arm.last.moving);

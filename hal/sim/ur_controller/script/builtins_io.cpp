@@ -105,6 +105,24 @@ void write_float(Call& c) {
   if (c.ok()) c.controller().outputs().doubles[i] = value;
 }
 
+void set_input_domain(Call& c) {
+  const std::size_t i = port(c);
+  const int domain = c.integer(1, 0, 1);
+  if (!c.ok()) return;
+  std::uint32_t& types = c.controller().io().analog_types;
+  types = domain == 1 ? types | (1U << i) : types & ~(1U << i);
+}
+void set_tool_input_domain(Call& c) {
+  const std::size_t i = port(c);
+  const int domain = c.integer(1, 0, 1);
+  if (!c.ok()) return;
+  std::uint32_t& types = c.controller().io().tool_analog_types;
+  types = domain == 1 ? types | (1U << i) : types & ~(1U << i);
+}
+
+/// What an installation sets up and this robot has no use for.
+void nothing(Call&) {}
+
 constexpr Builtin kTable[] = {
     {"get_analog_in", "n", get_analog_in},
     {"get_analog_out", "n", get_analog_out},
@@ -128,14 +146,31 @@ constexpr Builtin kTable[] = {
     {"read_output_float_register", "address", [](Call& c) { c.answer(c.robot().outputs.doubles[register_number(c)]); }},
     {"read_output_integer_register", "address",
      [](Call& c) { c.answer(std::int64_t{c.robot().outputs.integers[register_number(c)]}); }},
+    {"set_analog_inputrange", "port,range", nothing},
     {"set_analog_out", "n,f", set_analog_out},
     {"set_analog_outputdomain", "port,domain", set_output_domain},
+    {"set_configurable_digital_input_action", "port,action", nothing},
     {"set_configurable_digital_out", "n,b", set_output<Configurable>},
     {"set_digital_out", "n,b", set_digital_out},
     {"set_flag", "n,b", set_flag},
+    {"set_gp_boolean_input_action", "port,action", nothing},
+    {"set_input_actions_to_default", "", nothing},
+    {"set_runstate_configurable_digital_output_to_value", "outputId,state", nothing},
+    {"set_runstate_gp_boolean_output_to_value", "outputId,state", nothing},
+    {"set_runstate_outputs", "outputs", nothing},
+    {"set_runstate_standard_analog_output_to_value", "outputId,state", nothing},
+    {"set_runstate_standard_digital_output_to_value", "outputId,state", nothing},
+    {"set_runstate_tool_digital_output_to_value", "outputId,state", nothing},
+    {"set_standard_analog_input_domain", "port,domain", set_input_domain},
     {"set_standard_analog_out", "n,f", set_analog_out},
+    {"set_standard_digital_input_action", "port,action", nothing},
     {"set_standard_digital_out", "n,b", set_output<Standard>},
+    {"set_tool_analog_input_domain", "port,domain", set_tool_input_domain},
+    {"set_tool_communication", "enabled,baud_rate,parity,stop_bits,rx_idle_chars=1.5,tx_idle_chars=3.5", nothing},
+    {"set_tool_digital_input_action", "port,action", nothing},
     {"set_tool_digital_out", "n,b", set_output<Tool>},
+    {"set_tool_digital_output_mode", "n,mode", nothing},
+    {"set_tool_output_mode", "mode", nothing},
     {"set_tool_voltage", "voltage", set_tool_voltage},
     {"write_output_boolean_register", "address,value", write_bit},
     {"write_output_float_register", "address,value", write_float},

@@ -38,12 +38,50 @@ void list_length(Call& c) {
   c.fail_type(0, "a list");
 }
 
+double length_of(const List& list) {
+  double sum = 0;
+  for (const Value& value : list) sum += value.number() * value.number();
+  return std::sqrt(sum);
+}
+/// Of a number, a list or a pose.
 void norm(Call& c) {
+  if (const PoseValue* pose = c.value(0).as<PoseValue>()) return c.answer(length_of(list_of(pose->pose)));
   const List* list = c.value(0).as<List>();
   if (list == nullptr) return c.answer(std::abs(c.number(0)));
-  double sum = 0;
-  for (const Value& value : *list) sum += value.number() * value.number();
-  c.answer(std::sqrt(sum));
+  c.answer(length_of(*list));
+}
+void normalize(Call& c) {
+  const List* list = c.value(0).as<List>();
+  if (list == nullptr) return c.fail_type(0, "a list");
+  const double length = length_of(*list);
+  if (length <= 0) return c.fail("A vector without length");
+  List unit;
+  for (const Value& value : *list) unit.emplace_back(value.number() / length);
+  c.answer(std::move(unit));
+}
+
+/// Of a matrix its rows and columns.
+void size_of(Call& c) {
+  const List* list = c.value(0).as<List>();
+  const List* row = list != nullptr && !list->empty() ? list->front().as<List>() : nullptr;
+  if (row == nullptr) return list_length(c);
+  c.answer(List{Value(static_cast<std::int64_t>(list->size())), Value(static_cast<std::int64_t>(row->size()))});
+}
+void transpose(Call& c) {
+  const List* rows = c.value(0).as<List>();
+  const List* first = rows != nullptr && !rows->empty() ? rows->front().as<List>() : nullptr;
+  if (first == nullptr) return c.fail_type(0, "a matrix");
+  List columns;
+  for (std::size_t j = 0; j < first->size(); ++j) {
+    List column;
+    for (const Value& value : *rows) {
+      const List* row = value.as<List>();
+      if (row == nullptr || row->size() != first->size()) return c.fail_type(0, "a matrix");
+      column.push_back((*row)[j]);
+    }
+    columns.emplace_back(std::move(column));
+  }
+  c.answer(std::move(columns));
 }
 
 void pose_trans(Call& c) { c.answer(PoseValue{vector_of(c.pose(0) * c.pose(1))}); }
@@ -63,6 +101,18 @@ void pose_sub(Call& c) {
   difference.translation() = a.translation() - b.translation();
   difference.linear() = a.linear() * b.linear().transpose();
   c.answer(PoseValue{vector_of(difference)});
+}
+
+/// A wrench in the frame that `T_from_to` has its frame in.
+void wrench_trans(Call& c) {
+  const Pose from_T_to = c.pose(0);
+  const Vector6 w = c.six(1);
+  if (!c.ok()) return;
+  const Eigen::Matrix3d to_R_from = from_T_to.linear().transpose();
+  const Eigen::Vector3d force(w[0], w[1], w[2]), torque(w[3], w[4], w[5]);
+  const Eigen::Vector3d at_to = to_R_from * force;
+  const Eigen::Vector3d turned = to_R_from * (torque - from_T_to.translation().cross(force));
+  c.answer(list_of({at_to.x(), at_to.y(), at_to.z(), turned.x(), turned.y(), turned.z()}));
 }
 
 double distance(Call& c) { return (c.pose(0).translation() - c.pose(1).translation()).norm(); }
@@ -145,11 +195,13 @@ constexpr Builtin kTable[] = {
     {"floor", "f", whole<std::floor>},
     {"get_list_length", "v", list_length},
     {"integer_to_binary_list", "x", to_bits},
+    {"inv", "m", pose_inv},
     {"interpolate_pose", "p_from,p_to,alpha", interpolate_pose},
     {"length", "v", list_length},
     {"log", "b,f", logarithm},
     {"make_list", "length,initial_value,capacity=0", make_list},
     {"norm", "a", norm},
+    {"normalize", "v", normalize},
     {"point_dist", "p_from,p_to", point_dist},
     {"pose_add", "p_1,p_2", pose_add},
     {"pose_dist", "p_from,p_to", pose_dist},
@@ -162,8 +214,11 @@ constexpr Builtin kTable[] = {
     {"rotvec2rpy", "rotation_vector", rotvec2rpy},
     {"rpy2rotvec", "rpy_vector", rpy2rotvec},
     {"sin", "f", function<std::sin>},
+    {"size", "v", size_of},
     {"sqrt", "f", function<std::sqrt>},
     {"tan", "f", function<std::tan>},
+    {"transpose", "m", transpose},
+    {"wrench_trans", "T_from_to,w_from", wrench_trans},
 };
 
 }  // namespace

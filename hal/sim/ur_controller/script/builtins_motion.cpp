@@ -14,6 +14,7 @@ namespace {
 constexpr double kSwitch_rad_s2 = 10;  // brakes what moves before a path begins
 constexpr double kAcceleration_rad_s2 = 40;
 constexpr double kAccelerationMin = 0.01;  // of speedj and speedl
+constexpr const char* kInFreedrive = "The robot is in freedrive: it cannot follow a path";
 
 /// The arm is this thread's and stands; false while it does not, or when it is another's.
 bool arm_ready(Call& c) {
@@ -21,6 +22,7 @@ bool arm_ready(Call& c) {
     c.fail("Another thread is already controlling the robot");
     return false;
   }
+  if (c.robot().teach_mode) c.fail(kInFreedrive);
   if (!c.ok()) return false;
   if (!c.controller().motion().busy()) return true;
   if (c.state().first) static_cast<void>(c.controller().motion().stop(kSwitch_rad_s2));
@@ -101,6 +103,7 @@ void movec(Call& c) {
 /// servoj, speedj and speedl: the arm stays with the thread until it does something else.
 bool streaming_ready(Call& c) {
   if (!c.machine().take_arm(c.thread())) c.fail("Another thread is already controlling the robot");
+  if (c.robot().teach_mode) c.fail(kInFreedrive);
   return c.ok();
 }
 
@@ -151,22 +154,49 @@ void speedl(Call& c) {
 void stop_arm(Call& c) {
   const double deceleration = c.number(0);
   check_limits(c, 1, deceleration, 0);
+  if (c.robot().teach_mode) return;  // nothing of a program's moves
   if (!streaming_ready(c)) return;
   if (c.state().first) c.state().ticket = c.controller().motion().stop(deceleration);
   follow(c);
 }
 
+/// Hands may lead the arm from where the program has brought it to rest. Free axes and their frame are not looked at.
+void begin_freedrive(Call& c) {
+  if (c.robot().teach_mode || !arm_ready(c)) return;
+  c.machine().release_arm(c.thread());
+  c.controller().set_teach_mode(true);
+}
+void end_freedrive(Call& c) { c.controller().set_teach_mode(false); }
+
 void nothing(Call&) {}
+void no_ticks(Call& c) { c.answer(0.0); }
 
 constexpr Builtin kTable[] = {
+    {"conveyor_pulse_decode", "type,A,B", nothing},
+    {"encoder_enable_pulse_decode", "encoder_index,decoder_type,A,B", nothing},
+    {"encoder_enable_set_tick_count", "encoder_index,range_id", nothing},
+    {"encoder_get_tick_count", "encoder_index", no_ticks},
+    {"encoder_set_tick_count", "encoder_index,count", nothing},
+    {"encoder_unwind_delta_tick_count", "encoder_index,delta_tick_count", [](Call& c) { c.answer(c.number(1)); }},
+    {"get_conveyor_tick_count", "", no_ticks},
+    {"path_offset_disable", "a=20", nothing},
+    {"path_offset_enable", "", nothing},
+    {"path_offset_set", "offset,type=0", nothing},
+    {"path_offset_set_alpha_filter", "alpha", nothing},
+    {"path_offset_set_max_offset", "transLimit,rotLimit", nothing},
+    {"set_conveyor_tick_count", "tick_count,absolute_encoder_resolution=0", nothing},
+    {"set_safety_mode_transition_hardness", "type", nothing},
+    {"stop_conveyor_tracking", "a=20", nothing},
+    {"track_conveyor_circular", "center,ticks_per_revolution,rotate_tool=False,encoder_index=0", nothing},
+    {"track_conveyor_linear", "direction,ticks_per_meter,encoder_index=0", nothing},
     {"enable_external_ft_sensor", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
     {"end_force_mode", "", nothing},
-    {"end_freedrive_mode", "", nothing},
+    {"end_freedrive_mode", "", end_freedrive},
     {"force_mode", "task_frame,selection_vector,wrench,type,limits", nothing},
     {"force_mode_set_damping", "damping", nothing},
     {"force_mode_set_gain_scaling", "scaling", nothing},
-    {"freedrive_mode", "freeAxes=[],feature=[]", nothing},
-    {"freedrive_mode_no_incorrect_payload_check", "", nothing},
+    {"freedrive_mode", "freeAxes=[],feature=[]", begin_freedrive},
+    {"freedrive_mode_no_incorrect_payload_check", "", begin_freedrive},
     {"get_freedrive_status", "", [](Call& c) { c.answer(std::int64_t{0}); }},
     {"ft_rtde_input_enable", "enable,sensor_mass=0,sensor_measuring_offset=[],sensor_cog=[]", nothing},
     {"movec", "pose_via,pose_to,a=1.2,v=0.25,r=0,mode=0", movec},
@@ -177,10 +207,10 @@ constexpr Builtin kTable[] = {
     {"servoj", "q,a=0,v=0,t=0,lookahead_time=0.1,gain=300", servoj},
     {"speedj", "qd,a=1.4,t=0", speedj},
     {"speedl", "xd,a=1.2,t=0,aRot=0", speedl},
-    {"end_teach_mode", "", nothing},
+    {"end_teach_mode", "", end_freedrive},
     {"stopj", "a=2", stop_arm},
     {"stopl", "a=2,aRot=0", stop_arm},
-    {"teach_mode", "", nothing},
+    {"teach_mode", "", begin_freedrive},
     {"tool_contact", "direction=[]", [](Call& c) { c.answer(std::int64_t{0}); }},
     {"zero_ftsensor", "", nothing},
 };

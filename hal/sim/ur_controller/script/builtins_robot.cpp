@@ -1,7 +1,11 @@
 // Where the arm is, what it carries, what it could reach.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
+#include "hal/sim/ur_controller/rtde_table.hpp"
 #include "hal/sim/ur_controller/script/builtins.hpp"
 #include "hal/sim/ur_controller/script/inverse_pose.hpp"
 #include "hal/sim/ur_controller/steady_readings.hpp"
@@ -87,6 +91,12 @@ void set_tcp(Call& c) {
   if (c.ok()) c.controller().set_tcp_offset(offset);
 }
 
+void tool_accelerometer(Call& c) {
+  List list;
+  for (const double value : tool_acceleration(c.robot())) list.emplace_back(value);
+  c.answer(std::move(list));
+}
+
 void joint_temperature(Call& c) { c.answer(kJointTemperatures_c[static_cast<std::size_t>(c.integer(0, 0, 5))]); }
 
 /// At the TCP, as `external_force_torque` says (N).
@@ -98,6 +108,26 @@ void force(Call& c) {
 void set_gravity(Call& c) {
   const Vector3 gravity_m_s2 = c.three(0);
   if (c.ok()) c.controller().set_gravity(gravity_m_s2);
+}
+
+/// Over an input of an RTDE client, renewed so often (Hz): else the program is paused, stopped, or goes on.
+void set_watchdog(Call& c) {
+  using Action = RtdeWatchdogs::Action;
+  const std::string name = c.text(0);
+  std::string action = c.text(2);
+  const double frequency_hz = c.number(1);
+  std::ranges::transform(action, action.begin(), [](unsigned char ch) { return static_cast<char>(std::tolower(ch)); });
+  const ControllerIdentity& identity = c.controller().identity();
+  const RtdeInput input = find_rtde_input(name, identity);
+  if (input.read == nullptr) c.fail(fmt::format("rtde_set_watchdog: no input {}", name));
+  if (!(frequency_hz > 0)) c.fail("rtde_set_watchdog: the frequency must be positive");
+  if (action != "ignore" && action != "pause" && action != "stop") {
+    c.fail("rtde_set_watchdog: the action is \"ignore\", \"pause\" or \"stop\"");
+  }
+  if (!c.ok()) return;
+  const auto period_cycles = static_cast<std::uint64_t>(std::min(identity.frequency_hz() / frequency_hz, 1e9));
+  const Action asked = action == "ignore" ? Action::kIgnore : action == "pause" ? Action::kPause : Action::kStop;
+  c.controller().watchdogs().set({input.row, input.index}, period_cycles, asked, c.robot().control_step);
 }
 
 void nothing(Call&) {}
@@ -125,6 +155,7 @@ constexpr Builtin kTable[] = {
     {"get_target_joint_speeds", "", joint_speeds},
     {"get_target_payload", "", [](Call& c) { c.answer(c.robot().payload.mass_kg); }},
     {"get_target_payload_cog", "", payload_center},
+    {"get_target_payload_inertia", "", [](Call& c) { c.answer(list_of(c.robot().payload.inertia_kg_m2)); }},
     {"get_target_tcp_pose", "", tcp_pose},
     {"get_target_tcp_pose_along_path", "", tcp_pose},
     {"get_target_tcp_speed_along_path", "", tcp_speed},
@@ -132,11 +163,13 @@ constexpr Builtin kTable[] = {
     {"get_target_waypoint", "", tcp_pose},
     {"get_tcp_force", "", tcp_force},
     {"get_tcp_offset", "", [](Call& c) { c.answer(PoseValue{c.robot().tcp_offset}); }},
+    {"get_tool_accelerometer_reading", "", tool_accelerometer},
+    {"get_tool_current", "", [](Call& c) { c.answer(0.0); }},
     {"is_steady", "", [](Call& c) { c.answer(c.controller().motion().standing()); }},
     {"is_within_safety_limits", "x,qnear=[]", within_limits},
     {"position_deviation_warning", "enabled,threshold=0.8", nothing},
     {"reset_revolution_counter", "qNear=[]", nothing},
-    {"rtde_set_watchdog", "variable_name,min_frequency,action=\"pause\"", nothing},
+    {"rtde_set_watchdog", "variable_name,min_frequency,action=\"pause\"", set_watchdog},
     {"set_gravity", "d", set_gravity},
     {"set_payload", "m,cog=[],inertia=[]", set_payload},
     {"set_payload_cog", "cog", set_payload_center},

@@ -74,7 +74,13 @@ void powerdown(Call& c) {
 
 void protective_stop(Call& c) { c.controller().protective_stop("asked for by the program"); }
 
+/// "$" is no name that a script could call: a line with a label is compiled to it.
+void tell_label(Call& c) {
+  c.controller().tell({.kind = Kind::kLabel, .code = c.integer(0, 0, INT32_MAX), .text = c.text(1)});
+}
+
 constexpr Builtin kTable[] = {
+    {"$", "id,text", tell_label},
     {"halt", "", halt_program},
     {"popup", "s,title=\"Popup\",warning=False,error=False,blocking=False", popup},
     {"powerdown", "", powerdown},

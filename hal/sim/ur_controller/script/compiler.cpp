@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
 
@@ -128,7 +130,7 @@ class Compiler {
         functions.pop_back();
       } else if (token.is("global")) {
         declare_global(tokens_[i + 1].text);
-      } else if (depth == program_depth_ && assigns(i)) {
+      } else if (depth == program_depth_ && assigns(i) && !sets_signal(i)) {
         declare_global(token.text);
       }
       first = first && token.kind == Kind::kLineEnd;
@@ -156,6 +158,10 @@ class Compiler {
       } while (j < tokens_.size() && open > 0);
     }
     return j < tokens_.size() && tokens_[j].is("=");
+  }
+  /// "digital_out[2] = ...": an output by its old name, not a list of the program's.
+  [[nodiscard]] bool sets_signal(std::size_t i) const {
+    return tokens_[i].is("digital_out") && i + 1 < tokens_.size() && tokens_[i + 1].is("[");
   }
   void declare_global(const std::string& name) {
     if (global_numbers_.contains(name)) return;
@@ -256,6 +262,8 @@ class Compiler {
     if (now().kind == Kind::kEnd || error_) return;
     if (now().is("def") || now().is("thread")) {
       static_cast<void>(function(false));
+    } else if (now().is("$")) {
+      label();
     } else if (now().is("if")) {
       if_statement();
     } else if (now().is("while")) {
@@ -291,6 +299,22 @@ class Compiler {
       assignment_or_call();
     }
     skip_line_ends();
+  }
+
+  /// $ 3 "Move", and with it "breakAfter" or the like: where in a program of the pendant's the lines below come from.
+  void label() {
+    const Token where = now();
+    advance();
+    if (now().kind != Kind::kInteger) return fail_here();
+    constant(number(now()));
+    advance();
+    if (now().kind != Kind::kText) return fail_here();
+    constant(now().text);
+    advance();
+    if (now().kind == Kind::kText) advance();
+    emit_at(where, Op::kCallBuiltin, find_builtin("$"), 2);
+    emit(Op::kPop);
+    expect_line_end();
   }
 
   void if_statement() {
@@ -359,8 +383,30 @@ class Compiler {
     expect_line_end();
   }
 
+  [[nodiscard]] bool known(const std::string& name) const {
+    return scopes_.back().locals.contains(name) || global_numbers_.contains(name);
+  }
+
+  /// The index, and where a value is given that, too.
+  void signal(const Token& name, std::string_view builtin, bool given) {
+    advance();
+    expect("[");
+    expression();
+    expect("]");
+    if (given) {
+      expect("=");
+      expression();
+    }
+    emit_at(name, Op::kCallBuiltin, find_builtin(builtin), given ? 2 : 1);
+  }
+
   void assignment(bool global, bool local) {
     const Token target = now();
+    if (sets_signal(at_) && !known(target.text)) {
+      signal(target, "set_digital_out", true);
+      emit(Op::kPop);
+      return;
+    }
     advance();
     int indices = 0;
     if (now().is("[")) load(target);
@@ -552,6 +598,12 @@ class Compiler {
     if (token.is("run")) return run_thread();
     if (token.is("p") && ahead().is("[")) return pose(token);
     if (ahead().is("(")) return call(token);
+    // Signals by their old names, as the scripts of older clients have them.
+    constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kSignals = {
+        {{"digital_in", "get_digital_in"}, {"digital_out", "get_digital_out"}, {"analog_in", "get_analog_in"}}};
+    for (const auto& [name, builtin] : kSignals) {
+      if (token.is(name) && ahead().is("[") && !known(token.text)) return signal(token, builtin, false);
+    }
     advance();
     load(token);
   }

@@ -113,7 +113,7 @@ class Lexer {
     const std::string_view two = script_.substr(at_, 2);
     const bool pair = std::ranges::find(kTwo, two) != kTwo.end();
     const std::string_view found = pair ? two : script_.substr(at_, 1);
-    if (!pair && std::string_view("+-*/%<>=()[],:.{}").find(found[0]) == std::string_view::npos) return false;
+    if (!pair && std::string_view("+-*/%<>=()[],:.{}$").find(found[0]) == std::string_view::npos) return false;
     if (found == "(" || found == "[") ++depth_;
     if (found == ")" || found == "]") depth_ = std::max(0, depth_ - 1);
     push(Token::Kind::kSymbol, found);

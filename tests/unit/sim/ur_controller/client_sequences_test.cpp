@@ -96,7 +96,7 @@ TEST_CASE("UR's client library sets up RTDE: is the robot booted, pause, inputs,
       "actual_digital_input_bits,actual_digital_output_bits,standard_analog_input0,standard_analog_input1,"
       "standard_analog_output0,standard_analog_output1,analog_io_types,tool_mode,tool_analog_input_types,"
       "tool_analog_input0,tool_analog_input1,tool_output_voltage,tool_output_current,tool_temperature,robot_mode,"
-      "safety_mode,robot_status_bits,safety_status_bits,actual_current";
+      "safety_mode,robot_status_bits,safety_status_bits,actual_current,tcp_offset";
   CHECK(client.recipe('O', big_endian(hz) + outputs) == 1);
   CHECK(client.ask(rtde('S')).payload == "\1");
   const auto first = client.data(0.1);
@@ -129,6 +129,7 @@ TEST_CASE("UR's client library finds the documented answers on the dashboard", "
   session.output().clear();
   const auto answer = [&](const std::string& command) {
     session.receive(command + "\n");
+    for (int i = 0; i < 5000 && session.output().empty(); ++i) robot.robot.step();
     std::string line = session.output();
     session.output().clear();
     REQUIRE(line.ends_with('\n'));
@@ -176,6 +177,8 @@ TEST_CASE("UR's client library finds the documented answers on the dashboard", "
   matches("get serial number", "20.*");
   matches("get robot model", "UR.*");
   matches("generate flight report system", "(Flight Report generated with id:).*");
+  matches("generate flight report ", "(Flight Report generated with id:).*");
+  matches("load /ursim/programs/cart.urp", "Loading program: .*cart\\.urp");
   matches("generate support file .", "(Completed successfully:).*");
   matches("saveLog", "Log saved to disk");
   if (model == "ur5e") {

@@ -71,6 +71,36 @@ TEST_CASE("programs are loaded, played, paused and stopped from the dashboard", 
   CHECK(robot.dashboard("load installation x") == "File not found: x");
 }
 
+TEST_CASE("play, pause and stop are answered when it has happened, and what is asked meanwhile waits", "[ur]") {
+  UrRobot robot("ur5", true,
+                {{"cart.urp",
+                  "def cart():\n  while True:\n    speedj([0.5, 0, 0, 0, 0, 0], 1)\n    speedj([-0.5, 0, 0, 0, 0, 0], "
+                  "1)\n  end\nend\n",
+                  {}}});
+  CHECK(robot.dashboard("load cart.urp") == "Loading program: cart.urp");
+  Session& session = robot.robot.open(Port::kDashboard);
+  session.output().clear();
+  const auto ask = [&](const std::string& lines) {
+    session.receive(lines);
+    CHECK(session.output().empty());
+    robot.run(2);
+    std::string answers = session.output();
+    session.output().clear();
+    return answers;
+  };
+  CHECK(ask("play\nrunning\nprogramState\n") == "Starting program\nProgram running: true\nPLAYING cart.urp\n");
+  CHECK(ask("pause\nprogramState\n") == "Pausing program\nPAUSED cart.urp\n");
+  CHECK(ask("play\nprogramState\n") == "Starting program\nPLAYING cart.urp\n");
+  robot.run(0.3);
+  CHECK(ask("stop\nrunning\nprogramState\n") == "Stopped\nProgram running: false\nSTOPPED cart.urp\n");
+}
+
+TEST_CASE("a program that cannot be had from another computer fails to play", "[ur]") {
+  UrRobot robot("ur5e", true, {{"external.urp", "", {"10.0.0.9", 50002}}});
+  CHECK(robot.dashboard("load external.urp") == "Loading program: external.urp");
+  CHECK(robot.dashboard("play") == "Failed to execute: play");
+}
+
 TEST_CASE("who the robot is", "[ur]") {
   UrRobot cb3("ur10"), e_series("ur10e");
   CHECK(cb3.dashboard("get robot model") == "UR10");
@@ -92,7 +122,9 @@ TEST_CASE("commands of one generation are unknown to the other", "[ur]") {
   CHECK(e_series.dashboard("set operational mode automatic") == "Operational mode automatic is set");
   CHECK(e_series.dashboard("get operational mode") == "AUTOMATIC");
   CHECK(e_series.dashboard("set operational mode x") == "Failed setting operational mode: x");
-  CHECK_THAT(e_series.dashboard("clear operational mode"), StartsWith("No longer controlling the operational mode."));
+  CHECK(e_series.dashboard("clear operational mode") ==
+        "No longer controlling the operational mode. Current operational mode: 'AUTOMATIC'.");
+  CHECK(e_series.dashboard("get operational mode") == "NONE");
   CHECK(cb3.dashboard("setUserRole operator") == "Setting user role: operator");
   CHECK(cb3.dashboard("getUserRole") == "OPERATOR");
   CHECK_THAT(e_series.dashboard("setUserRole operator"), StartsWith("could not understand"));

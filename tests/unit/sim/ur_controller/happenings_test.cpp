@@ -98,6 +98,18 @@ TEST_CASE("a protective stop that pauses the program lets it go on after unlock 
   CHECK(std::abs(robot.state().q_rad[0]) < 1e-9);
 }
 
+TEST_CASE("Play on the pendant goes on with a paused program, whoever sent it", "[ur]") {
+  UrRobot robot("ur5");
+  robot.robot.open(Port::kSecondary).receive("def sent():\n  while True:\n    sync()\n  end\nend\n");
+  robot.run(0.5);
+  happens(robot, "pause");
+  robot.run(0.5);
+  REQUIRE(robot.state().runtime == RuntimeState::kPaused);
+  happens(robot, "play");
+  robot.run(0.5);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+}
+
 TEST_CASE("in recovery nothing plays", "[ur]") {
   UrRobot robot("ur5e");
   happens(robot, "recovery-mode");

@@ -155,6 +155,16 @@ TEST_CASE("script ports take the commands of clients without a dashboard", "[ur]
   robot.run(6);
   session.receive("set unlock protective stop\n");
   CHECK(robot.state().safety_mode == SafetyMode::kNormal);
+  session.receive("set speed 0.25\n");
+  CHECK(robot.state().speed_slider == 0.25);
+  session.receive("set speed fast\nset real\n");
+  CHECK(robot.state().speed_slider == 0.25);
+  session.receive("set robotmode freedrive\n");
+  robot.run(1);
+  CHECK(robot.state().teach_mode);
+  CHECK_FALSE(robot.state().program_running());
+  session.receive("set robotmode run\n");
+  CHECK_FALSE(robot.state().teach_mode);
   session.receive("power off\n");
   CHECK(robot.state().robot_mode == RobotMode::kPowerOff);
 }

@@ -114,20 +114,36 @@ TEST_CASE("frequencies divide the control loop's", "[ur]") {
   CHECK(packages(e_series, std::nan("")) == 500);
 }
 
-TEST_CASE("several recipes of one client, each with its number and frequency", "[ur]") {
+TEST_CASE("a client has one output recipe: the next takes its place", "[ur]") {
   UrRobot robot("ur5e");
   Client client(robot);
   client.protocol_2();
-  CHECK(client.outputs(500, "timestamp")[0] == 1);
-  CHECK(client.outputs(100, "robot_mode,safety_mode")[0] == 2);
+  CHECK(client.outputs(500, "timestamp,actual_q") == with_id(1, "DOUBLE,VECTOR6D"));
   client.start();
-  int first = 0, second = 0;
-  for (const std::string& payload : client.data(1)) {
-    if (payload[0] == 1) first += payload.size() == 9 ? 1 : 0;
-    if (payload[0] == 2) second += payload.size() == 9 ? 1 : 0;
-  }
-  CHECK(first == 500);
-  CHECK(second == 100);
+  CHECK(client.data(1).size() == 500);
+  CHECK(client.outputs(100, "robot_mode,nonsense") == with_id(0, "INT32,NOT_FOUND"));  // nothing changes
+  CHECK(client.data(1).back().size() == 57);
+  CHECK(client.outputs(100, "robot_mode,safety_mode") == with_id(1, "INT32,INT32"));
+  const auto data = client.data(1);
+  CHECK(data.size() == 100);
+  CHECK(data.back().size() == 9);
+}
+
+TEST_CASE("without an output recipe nothing starts", "[ur]") {
+  UrRobot robot("ur5e");
+  Client client(robot);
+  client.protocol_2();
+  CHECK(client.inputs("input_int_register_0") == with_id(1, "INT32"));
+  CHECK(client.ask(rtde('S')).payload == std::string(1, '\0'));
+  CHECK(client.outputs(10, "timestamp") == with_id(1, "DOUBLE"));
+  client.start();
+}
+
+TEST_CASE("the tool's offset is there from 3.12 and 5.5.1 on", "[ur]") {
+  UrRobot robot("ur5");
+  Client client(robot);
+  client.protocol_2();
+  CHECK(client.outputs(125, "tcp_offset") == with_id(1, "VECTOR6D"));
 }
 
 TEST_CASE("protocol 1 has neither frequency nor number", "[ur]") {
@@ -158,6 +174,7 @@ TEST_CASE("inputs take effect: slider, outputs under their masks, registers", "[
                       "standard_analog_output_1") == with_id(3, "UINT8,UINT8,DOUBLE,DOUBLE"));
   CHECK(client.inputs("input_bit_registers0_to_31,input_bit_register_64,input_int_register_0,input_int_register_47,"
                       "input_double_register_47") == with_id(4, "UINT32,BOOL,INT32,INT32,DOUBLE"));
+  CHECK(client.outputs(1, "timestamp") == with_id(1, "DOUBLE"));
   client.start();
   CHECK(client.send(rtde('U', std::string("\1") + big_endian(1, 4) + big_endian(0.25))).empty());
   CHECK(robot.state().speed_slider == 0.25);
@@ -229,6 +246,49 @@ TEST_CASE("data of a wrong size or number change nothing and are answered in wor
                       "abc"))
             .type == 'M');
   CHECK(client.send(rtde('M', std::string("\5hello\2me\3", 10))).empty());
+}
+
+TEST_CASE("a watchdog over an input pauses or stops the program that set it", "[ur]") {
+  const auto [action, after] = GENERATE(table<std::string, RuntimeState>({{"\"pause\"", RuntimeState::kPaused},
+                                                                          {"\"STOP\"", RuntimeState::kStopped},
+                                                                          {"\"ignore\"", RuntimeState::kPlaying}}));
+  UrRobot robot("ur5");
+  Client client(robot);
+  client.protocol_2();
+  static_cast<void>(client.outputs(10, "timestamp"));
+  CHECK(client.inputs("input_int_register_0,input_int_register_1") == with_id(1, "INT32,INT32"));
+  client.start();
+  Session& primary = robot.robot.open(Port::kPrimary);
+  primary.receive(std::string("def watched():\n  rtde_set_watchdog(\"input_int_register_0\", 10, ") + action +
+                  ")\n  while True:\n    sync()\n  end\nend\n");
+  for (int i = 0; i < 20; ++i) {
+    client.session.receive(rtde('U', std::string("\1\0\0\0\0\0\0\0\0", 9)));
+    robot.run(0.09);
+    REQUIRE(robot.state().runtime == RuntimeState::kPlaying);
+  }
+  robot.run(0.2);
+  CHECK(robot.state().runtime == after);
+  if (after != RuntimeState::kPaused) return;
+  // Time in the pause does not count; without a renewal it is paused again.
+  robot.run(5);
+  CHECK(robot.dashboard("play") == "Starting program");
+  robot.run(0.09);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  robot.run(0.3);
+  CHECK(robot.state().runtime == RuntimeState::kPaused);
+}
+
+TEST_CASE("a watchdog ends with its program, and needs an input that there is", "[ur]") {
+  UrRobot robot("ur5e");
+  Session& primary = robot.robot.open(Port::kPrimary);
+  primary.receive("def first():\n  rtde_set_watchdog(\"input_int_register_0\", 10, \"stop\")\nend\n");
+  robot.run(0.05);
+  primary.receive("def second():\n  while True:\n    sync()\n  end\nend\n");
+  robot.run(2);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  primary.receive("def third():\n  rtde_set_watchdog(\"no_such_input\", 10)\n  sleep(60)\nend\n");
+  robot.run(1);
+  CHECK_FALSE(robot.state().program_running());
 }
 
 TEST_CASE("packages may be cut anywhere", "[ur]") {

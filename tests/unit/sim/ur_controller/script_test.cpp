@@ -86,6 +86,18 @@ TEST_CASE("expressions", "[ur][script]") {
   CHECK_THAT(robot.value("textmsg(1)"), StartsWith("!"));  // has no value
 }
 
+TEST_CASE("vectors, matrices and wrenches", "[ur][script]") {
+  ScriptRobot robot;
+  CHECK(robot.value("norm(p[3, 4, 0, 0, 0, 0])") == "5");
+  CHECK(robot.value("normalize([0, 3, 4])") == "[0, 0.6, 0.8]");
+  CHECK(robot.value("size([[1, 2, 3], [4, 5, 6]])") == "[2, 3]");
+  CHECK(robot.value("transpose([[1, 2, 3], [4, 5, 6]])") == "[[1, 4], [2, 5], [3, 6]]");
+  CHECK(robot.value("inv(p[1, 2, 3, 0, 0, 0])") == robot.value("pose_inv(p[1, 2, 3, 0, 0, 0])"));
+  // 10 N along y, seen from 0.5 m further along x: a torque about z.
+  CHECK(robot.value("wrench_trans(p[0.5, 0, 0, 0, 0, 0], [0, 10, 0, 0, 0, 0])") == "[0, 10, 0, 0, 0, -5]");
+  CHECK(robot.value("get_target_payload_inertia()") == "[0, 0, 0, 0, 0, 0]");
+}
+
 TEST_CASE("poses", "[ur][script]") {
   ScriptRobot robot;
   CHECK(robot.value("pose_trans(p[1,0,0,0,0,1.5707963267948966], p[1,0,0,0,0,0])") == "p[1, 1, 0, 0, 0, 1.5708]");
@@ -339,6 +351,126 @@ end
   CHECK(robot.robot.controller().motion().standing());
 }
 
+TEST_CASE("freedrive from a script: hands lead the arm, the program goes on, its end holds the arm", "[ur][script]") {
+  const auto [begin, end] = GENERATE(table<std::string, std::string>(
+      {{"freedrive_mode()", "end_freedrive_mode()"},
+       {"teach_mode()", "end_teach_mode()"},
+       {"freedrive_mode(freeAxes=[1, 0, 0, 0, 0, 0], feature=\"tool\")", "end_freedrive_mode()"}}));
+  ScriptRobot robot("ur5");
+  Controller& controller = robot.robot.controller();
+  robot.send("def teach():\n  speedj([0.2, 0, 0, 0, 0, 0], 1, 0.5)\n  " + begin +
+             "\n  textmsg(\"free\")\n  sleep(4)\n  textmsg(get_actual_joint_positions()[0])\n  sleep(1)\n  " + end +
+             "\n  textmsg(\"held\")\n  sleep(1)\n  movej(get_actual_joint_positions())\n  textmsg(\"moved\")\nend\n");
+  robot.listen(1);
+  CHECK(robot.texts == std::vector<std::string>{"free"});
+  CHECK(robot.state().teach_mode);
+  CHECK(robot.state().control_mode() == 1);
+  CHECK(robot.state().robot_mode == RobotMode::kRunning);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  JointVector there = controller.motion().position_rad();
+  there[0] -= 0.5;
+  REQUIRE(controller.lead(there, 0.8, 2));
+  robot.listen(0.1);
+  CHECK(controller.motion().in_hand());
+  CHECK(robot_status_bits(robot.state()) == 0b0011U);  // no button is pressed
+  robot.listen(3);
+  CHECK(robot.state().q_rad[0] == Approx(there[0]).margin(1e-9));
+  CHECK(robot.texts.size() == 2);
+  // A hand that is still leading when it ends is held where it is, not where it wanted to go.
+  JointVector far = there;
+  far[0] += 2;
+  REQUIRE(controller.lead(far, 0.5, 2));
+  robot.listen(1.2);
+  REQUIRE(robot.texts.size() >= 3);
+  CHECK(robot.texts[2] == "held");
+  CHECK_FALSE(robot.state().teach_mode);
+  CHECK(robot.state().control_mode() == 0);
+  CHECK(controller.motion().standing());
+  CHECK(robot.state().q_rad[0] < far[0] - 1);
+  robot.listen(2);
+  CHECK(robot.texts.back() == "moved");
+  CHECK(robot.exceptions.empty());
+}
+
+TEST_CASE("in freedrive no path is followed, and what stops the program ends it", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("def f():\n  freedrive_mode()\n  stopj(2)\n  movej([0, -1, 1, 0, 0, 0])\nend\n");
+  REQUIRE(robot.exceptions.size() == 1);
+  CHECK(robot.exceptions[0].text == "The robot is in freedrive: it cannot follow a path");
+  CHECK(robot.exceptions[0].line == 4);
+  CHECK_FALSE(robot.state().teach_mode);
+  const std::string waits = "def f():\n  freedrive_mode()\n  sleep(60)\nend\n";
+  robot.send(waits);
+  CHECK(robot.state().teach_mode);
+  CHECK(robot.dashboard("stop") == "Stopped");
+  CHECK_FALSE(robot.state().teach_mode);
+  robot.send(waits);
+  robot.send("def g():\n  end_freedrive_mode()\nend\n");
+  CHECK_FALSE(robot.state().teach_mode);
+  robot.send(waits);
+  robot.robot.controller().protective_stop("a test");
+  CHECK_FALSE(robot.state().teach_mode);
+  robot.send("freedrive_mode()\n");
+  CHECK_FALSE(robot.state().teach_mode);
+}
+
+TEST_CASE("what this robot has not does nothing, and a program with it runs", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(R"(def p():
+  track_conveyor_linear(p[1, 0, 0, 0, 0, 0], 500.0)
+  textmsg(encoder_get_tick_count(0))
+  stop_conveyor_tracking(15)
+  path_offset_enable()
+  path_offset_set([0, 0, 0.01, 0, 0, 0], 3)
+  path_offset_disable()
+  set_tool_communication(True, 115200, 1, 2, 1.0, 3.5)
+  set_standard_digital_input_action(0, "freedrive")
+  set_runstate_standard_digital_output_to_value(1, 3)
+  set_runstate_outputs([])
+  set_analog_inputrange(2, 0)
+  set_input_actions_to_default()
+  force_mode(p[0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 5, 0, 0, 0], 2, [0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
+  end_force_mode()
+  textmsg("done")
+end
+)");
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"0", "done"});
+}
+
+TEST_CASE("programs of the pendant have labels, which the primary interface tells", "[ur][script]") {
+  ScriptRobot robot;
+  robot.primary.receive(
+      "def p():\n  $ 1 \"Robot Program\"\n  if True:\n    $ 2 \"Set\" \"breakAfter\"\n    textmsg(\"set\")\n  "
+      "end\nend\n");
+  robot.run(0.5);
+  std::vector<std::string> labels;
+  for (const UrPacket& packet : take_packets(robot.primary.output())) {
+    if (packet.type != 20 || packet.content[9] != 1) continue;
+    const std::string content = packet.content.substr(10);
+    labels.push_back(std::to_string(int_at(content, 0)) + content.substr(4));
+  }
+  CHECK(labels == std::vector<std::string>{"1Robot Program", "2Set"});
+  robot.send("def p():\n  $ \"Robot Program\"\nend\n");
+  REQUIRE(robot.exceptions.size() == 1);
+  CHECK_THAT(robot.exceptions[0].text, StartsWith("syntax_error_on_line:2:"));
+}
+
+TEST_CASE("signals by their old names", "[ur][script]") {
+  ScriptRobot robot("ur5");
+  robot.send("digital_out[2]=True\n");
+  CHECK(robot.state().io.output(2));
+  robot.send(
+      "def f():\n  digital_out[2] = not digital_out[2]\n  digital_out[1 + 2] = True\n  textmsg(digital_in[0])\nend\n");
+  CHECK_FALSE(robot.state().io.output(2));
+  CHECK(robot.state().io.output(3));
+  CHECK(robot.texts == std::vector<std::string>{"False"});
+  robot.texts.clear();
+  robot.send("def f():\n  digital_out = [1, 2]\n  digital_out[0] = 7\n  textmsg(digital_out)\nend\n");
+  CHECK(robot.texts == std::vector<std::string>{"[7, 2]"});
+  CHECK(robot.exceptions.empty());
+}
+
 TEST_CASE("inputs, outputs and registers from a script", "[ur][script]") {
   ScriptRobot robot;
   robot.robot.controller().set_digital_input(3, true);
@@ -503,8 +635,11 @@ TEST_CASE("External Control asks another computer for its program at Play", "[ur
   UrRobot with_program("ur5e", true, {{"external_control.urp", "", {"10.0.0.2", 50002}}});
   with_program.robot.programs().set_sockets(&peer);
   CHECK_THAT(with_program.dashboard("load external_control.urp"), StartsWith("Loading program"));
-  CHECK(with_program.dashboard("play") == "Starting program");
+  Session& pendant = with_program.robot.open(Port::kDashboard);
+  pendant.output().clear();
+  pendant.receive("play\n");
   with_program.run(0.1);
+  CHECK(pendant.output().empty());
   CHECK(peer.host == "10.0.0.2");
   CHECK(peer.sent == "request_program\n");
   CHECK(with_program.state().runtime == RuntimeState::kStopped);
@@ -515,13 +650,12 @@ TEST_CASE("External Control asks another computer for its program at Play", "[ur
   CHECK(with_program.state().runtime == RuntimeState::kStopped);  // more could come
   with_program.run(0.4);
   CHECK(with_program.state().runtime == RuntimeState::kPlaying);
+  CHECK(pendant.output() == "Starting program\n");
   CHECK(with_program.state().io.output(3));
   CHECK(with_program.dashboard("stop") == "Stopped");
-  with_program.run(0.1);
 
   // Nobody answers: nothing starts.
-  CHECK(with_program.dashboard("play") == "Starting program");
-  with_program.run(3);
+  CHECK(with_program.dashboard("play") == "Failed to execute: play");
   CHECK(with_program.state().runtime == RuntimeState::kStopped);
   CHECK(with_program.dashboard("stop") == "Failed to execute: stop");
   with_program.robot.programs().set_sockets(nullptr);
