@@ -227,7 +227,9 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
                    "added to the ports 29999, 30001 to 30004, 30011 to 30013, 30098")
       ->check(CLI::Range(-29000, 35500))
       ->capture_default_str();
-  ur_sim_app->add_option("--seed", ur_sim.seed, "draws the arm's factory correction; 0: the published kinematics")
+  ur_sim_app
+      ->add_option("--seed", ur_sim.seed,
+                   "draws the arm's factory correction; 0: the published kinematics. With --cell: as of the run there")
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}))
       ->capture_default_str();
   ur_sim_app->add_option("--serial", ur_sim.serial, "serial number (default: made up from the seed)");
@@ -241,9 +243,10 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       "--external-control", ur_sim.external_control,
       "HOST or HOST:PORT (50002): whom the program external_control.urp asks for its script at Play");
 
-  ur_sim_app->add_option("--cell", ur_sim.cell,
-                         "simulated cell whose arm this is: it stands as the cell's does, and tells its true joints to "
-                         "the cameras of `firstlook run --robot`; --seed as there");
+  ur_sim_app->add_option(
+      "--cell", ur_sim.cell,
+      "simulated cell whose arm this is: it stands as the cell's does, and tells its true joints to "
+      "the cameras of `firstlook run --robot`; --seed as there, and the robot that belongs to the cell");
   ur_sim_app->add_option("--play-after", ur_sim.play_after_s,
                          "so many seconds after the start somebody presses Play on external_control.urp, again every "
                          "3 s until it runs; with --lockstep once, in the job's time, 0.5 if not given");

@@ -43,7 +43,7 @@ Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimComma
     options.encoder_seed = command.seed;
     options.remote_control = false;  // somebody stands at its pendant
   }
-  const auto identity = sim::ur::identify_controller(model, command.seed, command.serial);
+  const auto identity = sim::ur::identify_controller(model, scene ? scene->robot : command.seed, command.serial);
   if (!identity && scene != nullptr)
     return failure(identity.error().fault, "the arm of {}: {}", scene->name, identity.error().detail());
   if (!identity) return std::unexpected(identity.error());

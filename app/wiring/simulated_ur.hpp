@@ -9,7 +9,9 @@
 
 namespace firstlook {
 
-/// @param scene  the cell whose arm it is: it stands as that does, and its encoders are as noisy; null: it is alone
+/// @param scene  the cell whose arm it is: the same robot whatever the seed, which stands as that does and whose
+/// encoders
+///               are as noisy; null: it is alone
 /// Errors: those of the programs' files, and kUsage for words that are not understood.
 [[nodiscard]] Result<std::unique_ptr<sim::ur::SimulatedUr>> make_simulated_ur(const UrSimCommand& command,
                                                                               const sim::Scene* scene);

@@ -297,6 +297,7 @@ Result<Scene> make_random_cell(std::uint64_t cell_seed, std::uint64_t seed) {
   for (int draw = 0; draw < kDrawsMax; ++draw) {
     Scene scene = Layout(cell_seed, draw).draw();
     scene.name = fmt::format("random:{}", cell_seed);
+    scene.robot = cell_seed;
     scene.mount.link_T_camera = assembled(scene.mount.link_T_camera, seed);
     const ArmModel& arm = scene.arm;
     Scene with_margin = scene;

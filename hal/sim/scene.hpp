@@ -99,7 +99,8 @@ struct Light {
 struct Scene {
   std::string name;
   ArmModel arm = *find_arm_model("ur5");
-  std::string arm_file;  ///< that the arm was read from; empty: it is built in
+  std::string arm_file;     ///< that the arm was read from; empty: it is built in
+  std::uint64_t robot = 1;  ///< which one of its model: draws serial number and factory correction of its controller
   JointVector start_rad;
   std::vector<Solid> solids;  ///< floor, walls, cart and the boards' panels included; not the arm
   std::vector<BoardPlacement> boards = std::vector<BoardPlacement>(1);

@@ -26,7 +26,7 @@ TEST_CASE("a part of the job is nothing to resume", "[scenario]") {
   CHECK_THAT(run.err, Contains("--resume") && Contains("--only"));
 }
 
-TEST_CASE("a service that was started without a device leaves no folder; a job that began does", "[scenario]") {
+TEST_CASE("a service that was started without a device leaves no folder, a job that began does", "[scenario]") {
   const JobFolder folder;
   const auto start = [&](const char* faults) {
     return folder.run({"run", "--cell", "empty", "--seed", "1", "--sensor", "fast", "--resume", "--faults", faults});

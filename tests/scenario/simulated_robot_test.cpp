@@ -187,7 +187,7 @@ TEST_CASE("whole jobs meet what can happen to a robot: done, or stopped with a r
   CHECK(whole_job({"30=slider=0.3", "60=slider=1", "75=clock=3600"}) == "done");
 }
 
-TEST_CASE("a whole job on an e-Series; a factory correction that is another's is refused", "[scenario]") {
+TEST_CASE("a whole job on an e-Series, a factory correction that is another's is refused", "[scenario]") {
   const JobFolder folder;
   folder.write("cell.yaml",
                "arm: ur5e\nwalls: {low_m: [-2.0, -1.9], high_m: [2.1, 2.0], height_m: 2.6}\n"
@@ -276,7 +276,7 @@ TEST_CASE("a job on a robot whose factory correction comes from a file of ROS", 
   CHECK(kinematics["file"]["hash_agrees"] == true);
   CHECK(kinematics["file"]["flange_off_m"].get<double>() < 1e-9);
   CHECK(folder.read("run/report.html").find(hash) != std::string::npos);
-  const ProgramResult another = folder.run({"run", "--cell", "empty", "--seed", "2", "--sensor", "fast", "--out",
+  const ProgramResult another = folder.run({"run", "--cell", "random:2", "--seed", "1", "--sensor", "fast", "--out",
                                             "another", "--robot", "simulated", "--config", "site.yaml"});
   CHECK(another.exit_code == 3);  // another robot
   CHECK(another.err.find("robot.calibration_file") != std::string::npos);

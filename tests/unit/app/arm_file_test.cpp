@@ -234,7 +234,7 @@ TEST_CASE("a URDF that is no arm is refused by what is wrong with it", "[arm_fil
   CHECK(parse_arm_urdf(replaced(good, sphere(0.04), ""), "arm.urdf", ".", bare));
 }
 
-TEST_CASE("meshes give capsules that hold every vertex; broken ones are refused", "[arm_file]") {
+TEST_CASE("meshes give capsules that hold every vertex, broken ones are refused", "[arm_file]") {
   Random random(3);
   std::vector<Vector3d> points;
   for (int i = 0; i < 300; ++i)

@@ -29,7 +29,7 @@ std::string cut_off(const test::TemporaryFolder& runs, const std::string& name, 
 
 }  // namespace
 
-TEST_CASE("the newest run that was cut off is offered; finished ones are not") {
+TEST_CASE("the newest run that was cut off is offered, finished ones are not") {
   const test::TemporaryFolder runs("firstlook-runs");
   CHECK_FALSE(newest_cut_off_run((runs.path() / "none").string()));
   CHECK_FALSE(newest_cut_off_run(runs.path().string()));

@@ -47,7 +47,7 @@ struct Devices {
 
 }  // namespace
 
-TEST_CASE("a device that goes and comes back is an event each time; one that starts is as it was") {
+TEST_CASE("a device that goes and comes back is an event each time, one that starts is as it was") {
   Devices d;
   CHECK(d.second().empty());
   CHECK_FALSE(d.source->take_news());

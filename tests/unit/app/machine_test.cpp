@@ -259,7 +259,7 @@ TEST_CASE("a calibration view is chosen on the way to the one before, and certif
   CHECK(due == (certifies ? 7 : 12));
 }
 
-TEST_CASE("a view of Explore that tells little is followed by the one chosen on the way; others, or a pause, ask anew",
+TEST_CASE("a view of Explore that tells little is followed by the one chosen on the way, others, or a pause, ask anew",
           "[machine]") {
   enum class Case { kLittle, kMuch, kExpectedMuch, kNotUsed, kPaused };
   const Case which = GENERATE(Case::kLittle, Case::kMuch, Case::kExpectedMuch, Case::kNotUsed, Case::kPaused);
@@ -765,7 +765,7 @@ void touch_corners(ScriptedWorld& world, int corners) {
 
 }  // namespace
 
-TEST_CASE("a person touches the corners asked for and brings the arm back; firstlook moves nothing meanwhile",
+TEST_CASE("a person touches the corners asked for and brings the arm back, firstlook moves nothing meanwhile",
           "[machine]") {
   ScriptedWorld world(with_touch_test());
   std::vector<TouchedPoint> touches;

@@ -67,7 +67,7 @@ void mend() {
 
 }  // namespace
 
-TEST_CASE("both cameras of a Kinect deliver, unmirrored and in millimetres; its tilt is left alone", "[freenect]") {
+TEST_CASE("both cameras of a Kinect deliver, unmirrored and in millimetres, its tilt is left alone", "[freenect]") {
   mend();
   fake_kinect().first_ticks = 0xFFFFFFFF - 20'000'000;  // its clock begins anew on the way
   {

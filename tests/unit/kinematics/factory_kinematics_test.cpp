@@ -82,7 +82,7 @@ std::pair<double, double> flanges_apart(const ArmModel& a, const ArmModel& b) {
   return worst;
 }
 
-TEST_CASE("axes that are nearly parallel are measured with frames far away; they come back to the links, exactly",
+TEST_CASE("axes that are nearly parallel are measured with frames far away, they come back to the links, exactly",
           "[kinematics]") {
   for (const char* name : {"ur3", "ur5e", "ur10e"}) {
     const ArmModel published = *find_arm_model(name);

@@ -51,7 +51,7 @@ TEST_CASE("crossing segments touch, capsules overlap by their radii") {
   CHECK(capsule_distance_m(a, c) == Approx(0.7));
 }
 
-TEST_CASE("an arm that stands normally is free of itself; folded wrists and elbows are not") {
+TEST_CASE("an arm that stands normally is free of itself, folded wrists and elbows are not") {
   const ArmModel arm = *find_arm_model("ur5");
   const SelfPairs pairs = self_pairs_of_arm(arm.body, 0.005);
   const auto margin = [&](const JointVector& q) { return self_margin_m(place(arm.body, forward(arm, q)), pairs); };

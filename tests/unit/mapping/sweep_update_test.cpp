@@ -88,7 +88,7 @@ TEST_CASE("a sweep of lines is one update, as OctoMap would make it", "[mapping]
   }
 }
 
-TEST_CASE("many lines through one voxel miss it once; line by line they miss it many times", "[mapping]") {
+TEST_CASE("many lines through one voxel miss it once, line by line they miss it many times", "[mapping]") {
   const GridGeometry geometry = cube(0.05);
   const std::vector<float> wall(1, 2.0F);
   const Transform<Base, Depth> origin(Eigen::Quaterniond::Identity(), {0.025, 0.025, 0.025});
@@ -175,7 +175,7 @@ TEST_CASE("two sensors of different kinds feed one map as OctoMap takes their cl
   require_equal(map, tree);
 }
 
-TEST_CASE("two sensors at one time are two viewpoints; a hit of either takes free space away", "[mapping][safety]") {
+TEST_CASE("two sensors at one time are two viewpoints, a hit of either takes free space away", "[mapping][safety]") {
   const GridGeometry geometry = cube(0.05);
   const DepthSensor sensor{{64, 48, 40, 40, 31.5, 23.5}, 0.2, 2.5, 2.5, 0};
   Inserter left(geometry, sensor), right(geometry, sensor);

@@ -45,7 +45,7 @@ void for_each_point(const Capsule& c, double spacing_m, Visit visit) {
 
 }  // namespace
 
-TEST_CASE("on the path at any time the deviation is zero; off it the displacement is measured in metres") {
+TEST_CASE("on the path at any time the deviation is zero, off it the displacement is measured in metres") {
   const Body body = bare_body(kArm);
   const FreeSpace space;
   const JointVector from = default_start(kArm);

@@ -125,7 +125,7 @@ TEST_CASE("frames come unmirrored, in millimetres, with intrinsics by the field 
   CHECK_FALSE(rig.camera->read(rig.frames.back(), {other.data(), kWidth, 1}));
 }
 
-TEST_CASE("a sensor that stays mirrored is mirrored back; one that stays registered is refused", "[openni]") {
+TEST_CASE("a sensor that stays mirrored is mirrored back, one that stays registered is refused", "[openni]") {
   test::TestDepth& sensor = virtual_sensor();
   SECTION("mirrored") {
     sensor.always_mirrored = true;

@@ -200,7 +200,7 @@ TEST_CASE("the true flange deviates by the stated sigmas, the same at the same c
   CHECK(std::sqrt(squares_rad / n) == Approx(2e-4).epsilon(0.2));
 }
 
-TEST_CASE("reports come at 125 Hz, in order, with encoder noise; the same seed gives the same", "[sim][arm]") {
+TEST_CASE("reports come at 125 Hz, in order, with encoder noise, the same seed gives the same", "[sim][arm]") {
   SimulatedArm a(playing()), b(playing());
   std::vector<hal::ArmState> reports;
   while (const auto state = a.poll(at(1))) reports.push_back(*state);

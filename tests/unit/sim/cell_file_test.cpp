@@ -156,7 +156,7 @@ TEST_CASE("names that are no cell are refused") {
   CHECK(load_cell("random:12x", 1).error().fault == Fault::kCellInvalid);
 }
 
-TEST_CASE("several boards hang in a cell, each with its panel; sets that cannot be told apart are refused") {
+TEST_CASE("several boards hang in a cell, each with its panel, sets that cannot be told apart are refused") {
   using Catch::Matchers::Contains;
   const std::string place = "center_m: [0.9, 0, 0.3], faces: [-1, 0, 0.3]";
   const auto two = parse_cell("boards:\n  - {name: a, " + place +

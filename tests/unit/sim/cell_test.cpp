@@ -148,7 +148,7 @@ TEST_CASE("an obstacle that appears in the way stops the arm by contact", "[sim]
   CHECK(cell->grader().contacts() == 1);
 }
 
-TEST_CASE("a camera beside the arm sees the same, wherever the arm is; without a board nothing is found",
+TEST_CASE("a camera beside the arm sees the same, wherever the arm is, without a board nothing is found",
           "[sim][cell]") {
   const auto fixed = cell_with("camera.fixed=1");
   const auto before = fixed->color().poll(at(1));

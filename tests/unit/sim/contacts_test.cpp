@@ -128,7 +128,7 @@ TEST_CASE("inside the intact safe zone nothing counts, outside of it the same vo
   CHECK(grown <= 8);  // all the voxels there are
 }
 
-TEST_CASE("where the upper arm begins inside the shoulder, the base allowance excuses both; farther out neither",
+TEST_CASE("where the upper arm begins inside the shoulder, the base allowance excuses both, farther out neither",
           "[sim][contacts]") {
   const BoxWorld world;
   const JointVector from = stretched(0), to = stretched(0.5);
@@ -196,7 +196,7 @@ TEST_CASE("the camera's housing lies inside what the program takes for it", "[si
   }
 }
 
-TEST_CASE("what a person leads the arm into is not the program's doing; moving off from there is", "[sim][contacts]") {
+TEST_CASE("what a person leads the arm into is not the program's doing, moving off from there is", "[sim][contacts]") {
   BoxWorld world;
   const Eigen::Vector3d post = camera_at(stretched(0.8));
   world.boxes.push_back({post - Eigen::Vector3d(0.005, 0.005, 0.03), post + Eigen::Vector3d(0.005, 0.005, 0.03)});

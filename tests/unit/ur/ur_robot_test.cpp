@@ -104,7 +104,7 @@ TEST_CASE("stop in the middle of a move, and go on from there", "[ur]") {
   CHECK(arm.keys == std::vector{OperatorAction::kPlay});
 }
 
-TEST_CASE("a pause withdraws the segment; after it nothing moves until it is asked to", "[ur]") {
+TEST_CASE("a pause withdraws the segment, after it nothing moves until it is asked to", "[ur]") {
   const double pause_s = GENERATE(0.3, 2.0, 120.0);
   Playing playing;
   test::DrivenUr& arm = playing.arm;
@@ -201,7 +201,7 @@ TEST_CASE("a protective stop is reported, refuses motion, and is not unlocked", 
   CHECK_FALSE(arm.last.program_running);
 }
 
-TEST_CASE("an emergency stop and a safeguard stop end consent; a gate that closes does not give it back", "[ur]") {
+TEST_CASE("an emergency stop and a safeguard stop end consent, a gate that closes does not give it back", "[ur]") {
   Playing playing;
   test::DrivenUr& arm = playing.arm;
   playing.move(1, 5);

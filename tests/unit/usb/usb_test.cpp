@@ -72,7 +72,7 @@ TEST_CASE("a path tells the hub that a device is plugged into") {
   CHECK(hub_of("usb2").empty());
 }
 
-TEST_CASE("sensors are told by their numbers, cameras by their class; the rest is no sensor") {
+TEST_CASE("sensors are told by their numbers, cameras by their class, the rest is no sensor") {
   CHECK(part_of(device("1-1", 0x1d27, 0x0601)) == Part::kDepthSensor);
   CHECK(part_of(device("1-1", 0x045e, 0x02ae)) == Part::kKinectCamera);
   CHECK(part_of(device("1-1", 0x045e, 0x02b0)) == Part::kKinectMotor);

@@ -177,7 +177,7 @@ TEST_CASE("the last 32 frames are held", "[v4l2][camera]") {
   CHECK(gone.error().fault == Fault::kFrameGone);
 }
 
-TEST_CASE("the granted format is used, padding and all; one of another size is refused by name", "[v4l2][camera]") {
+TEST_CASE("the granted format is used, padding and all, one of another size is refused by name", "[v4l2][camera]") {
   Rig rig;
   SECTION("longer rows") {
     rig.kernel.grant = [](v4l2_pix_format& pix) { pix.bytesperline = 2 * kWidth + 32; };
@@ -347,7 +347,7 @@ TEST_CASE("a feeder that hangs behind a loopback stays lost, although each openi
   CHECK_FALSE(rig.frames.empty());
 }
 
-TEST_CASE("a disturbed signal is survived; one that stays is opened again", "[v4l2][camera]") {
+TEST_CASE("a disturbed signal is survived, one that stays is opened again", "[v4l2][camera]") {
   Rig rig;
   rig.run(1);
   rig.kernel.input_errors = 3;

@@ -149,7 +149,7 @@ TEST_CASE("each format finds its samples, with rows longer than the picture", "[
   }
 }
 
-TEST_CASE("a JPEG is read with and without its Huffman tables; a broken one is refused", "[v4l2][pixels]") {
+TEST_CASE("a JPEG is read with and without its Huffman tables, a broken one is refused", "[v4l2][pixels]") {
   constexpr int kWidth = 64, kHeight = 48;
   std::vector<Rgb> drawn(kWidth * kHeight);
   for (int r = 0; r < kHeight; ++r) {

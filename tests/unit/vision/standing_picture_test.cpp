@@ -84,7 +84,7 @@ TEST_CASE("without noise any motion above what matters is seen, a smaller one is
   CHECK(judge_standing(moving, 0.05)->still);
 }
 
-TEST_CASE("one frame stands still; frames that share few corners are compared by these") {
+TEST_CASE("one frame stands still, frames that share few corners are compared by these") {
   Random random(5);
   CornerSet a = frame(random, 4, 3, 0);
   const auto one = judge_standing(std::vector{a});

@@ -92,7 +92,7 @@ TEST_CASE("a crash is told with its signal and the last words", "[app][campaign]
   CHECK(judged(t).reason.size() < 400);
 }
 
-TEST_CASE("a cell that was ended at its limit hangs; one that ended just before does not", "[app][campaign]") {
+TEST_CASE("a cell that was ended at its limit hangs, one that ended just before does not", "[app][campaign]") {
   CellTraces t = traces(0);
   t.at_limit = true;
   CHECK(judged(t).outcome == CellOutcome::kDone);

@@ -201,7 +201,7 @@ TEST_CASE("a journal from a program that died is read up to where it ends, then 
   CHECK(end.error().detail() == fmt::format("byte {}: cut short in record 1", bytes.size()));
 }
 
-TEST_CASE("at the cap the recording stops and says so; the journal stays valid and the hash goes on") {
+TEST_CASE("at the cap the recording stops and says so, the journal stays valid and the hash goes on") {
   constexpr std::size_t kCap = 1000;
   auto writer = JournalWriter::create_memory(kNoHeader, kCap);
   REQUIRE(writer);
@@ -259,7 +259,7 @@ TEST_CASE("a file holds the same bytes as memory, and recording to it does not a
   CHECK(JournalReader::open(path));
 }
 
-TEST_CASE("a full disk becomes a status; recording stops, the hash goes on") {
+TEST_CASE("a full disk becomes a status, recording stops, the hash goes on") {
   const auto no_header = JournalWriter::create_file("/dev/full", kNoHeader);
   REQUIRE_FALSE(no_header);
   CHECK(no_header.error().fault == Fault::kDiskWrite);

@@ -132,7 +132,7 @@ TEST_CASE("reading refuses what is absent, too large, or no file") {
   CHECK(fault(read_file(folder / "pipe", 10)) == Fault::kDataMalformed);
 }
 
-TEST_CASE("folders are made with those above them; empty and absent ones count as empty") {
+TEST_CASE("folders are made with those above them, empty and absent ones count as empty") {
   const TemporaryFolder folder;
   const std::string deep = folder / "a/b/c";
   CHECK(folder_is_empty(deep).value());

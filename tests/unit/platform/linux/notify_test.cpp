@@ -6,7 +6,7 @@
 
 using namespace firstlook;
 
-TEST_CASE("messages reach the service manager; without one nothing happens") {
+TEST_CASE("messages reach the service manager, without one nothing happens") {
   const test::ServiceSocket manager;
   const ServiceManager service(manager.path().string());
   CHECK(service.present());

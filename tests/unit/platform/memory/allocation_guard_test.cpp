@@ -106,7 +106,7 @@ TEST_CASE("the first counted allocation is remembered, with where it came from")
 }
 
 TEST_CASE(
-    "the simulated cell, jobs and other threads may allocate while the loop is sealed; before and after all may") {
+    "the simulated cell, jobs and other threads may allocate while the loop is sealed, before and after all may") {
   CHECK(counted([] {
           const memory::SimulationScope simulation;
           use_new(10);

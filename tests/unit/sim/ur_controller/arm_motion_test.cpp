@@ -234,7 +234,7 @@ TEST_CASE("an arm that brakes on its path swings by how hard it brakes", "[ur]")
   CHECK(largest_rad == Approx(owns_rad).epsilon(0.02));
 }
 
-TEST_CASE("a hand leads a standing arm, whatever the slider says; a program's motion is its own again", "[ur]") {
+TEST_CASE("a hand leads a standing arm, whatever the slider says, a program's motion is its own again", "[ur]") {
   Arm arm;
   arm.slider = 0.1;
   const JointVector target = arm.ahead(0.8);

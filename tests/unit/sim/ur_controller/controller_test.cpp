@@ -77,7 +77,7 @@ TEST_CASE("a protective stop ends program and motion, and can be unlocked after 
   CHECK(controller.can_play());
 }
 
-TEST_CASE("an emergency stop takes the power; releasing it does not bring it back", "[ur]") {
+TEST_CASE("an emergency stop takes the power, releasing it does not bring it back", "[ur]") {
   UrRobot robot("ur10e");
   Controller& controller = robot.robot.controller();
   controller.play();
