@@ -66,13 +66,15 @@ void get_analog_out(Call& c) {
 void get_analog_in(Call& c) { c.answer(c.robot().io.analog_inputs[port(c)]); }
 void get_tool_analog_in(Call& c) { c.answer(c.robot().io.tool_analog_inputs[port(c)]); }
 
-void set_output_domain(Call& c) {
-  const std::size_t i = port(c);
+/// 0 is current, 1 voltage: a bit for each port, from `first_bit` on.
+void set_domain(Call& c, std::uint32_t& types, std::size_t first_bit) {
+  const std::uint32_t bit = 1U << (first_bit + port(c));
   const int domain = c.integer(1, 0, 1);
-  if (!c.ok()) return;
-  std::uint32_t& types = c.controller().io().analog_types;
-  types = domain == 1 ? types | (4U << i) : types & ~(4U << i);
+  if (c.ok()) types = domain == 1 ? types | bit : types & ~bit;
 }
+void set_input_domain(Call& c) { set_domain(c, c.controller().io().analog_types, 0); }
+void set_output_domain(Call& c) { set_domain(c, c.controller().io().analog_types, 2); }
+void set_tool_input_domain(Call& c) { set_domain(c, c.controller().io().tool_analog_types, 0); }
 
 void set_tool_voltage(Call& c) {
   const int volts = c.integer(0, 0, 24);
@@ -103,21 +105,6 @@ void write_float(Call& c) {
   const std::size_t i = register_number(c);
   const double value = c.number(1);
   if (c.ok()) c.controller().outputs().doubles[i] = value;
-}
-
-void set_input_domain(Call& c) {
-  const std::size_t i = port(c);
-  const int domain = c.integer(1, 0, 1);
-  if (!c.ok()) return;
-  std::uint32_t& types = c.controller().io().analog_types;
-  types = domain == 1 ? types | (1U << i) : types & ~(1U << i);
-}
-void set_tool_input_domain(Call& c) {
-  const std::size_t i = port(c);
-  const int domain = c.integer(1, 0, 1);
-  if (!c.ok()) return;
-  std::uint32_t& types = c.controller().io().tool_analog_types;
-  types = domain == 1 ? types | (1U << i) : types & ~(1U << i);
 }
 
 /// What an installation sets up and this robot has no use for.
