@@ -91,9 +91,14 @@ Result<RunFolder> run_folder(const RunCommand& command, const Config& config) {
   return RunFolder::named(fmt::format("{}/{}-{}", kRunsFolder, utc_date_for_name(), config.seed));
 }
 
+/// Of a real cart; "none" where the configuration names no robot on the network.
+std::string_view robot_of(const Config& config) {
+  return names_network_robot(config) ? std::string_view(config.robot.host) : "none";
+}
+
 /// A service that cannot be opened says so until it is started again: why, and of every device what it needs.
 void tell_what_is_missing(const Config& config, const Error& error, Narrator& narrator) {
-  ServiceStatus status(config.robot.host);
+  ServiceStatus status(robot_of(config));
   if (!status.heard()) return;
   const auto tell_why = [&] {
     status.state(state_row(StateId::kBoot).name, false);
@@ -124,7 +129,7 @@ Result<std::unique_ptr<JobSite>> open_site(const RunCommand& command, Config& co
 
 std::string where(const RunCommand& command, const LoadedConfig& loaded) {
   const Config& config = loaded.config;
-  if (names_real_cart(config)) return fmt::format("running on the real cart, robot {}", config.robot.host);
+  if (names_real_cart(config)) return fmt::format("running on the real cart, robot {}", robot_of(config));
   const bool configured = command.cell_given || !loaded.file.empty();
   return fmt::format("{}running in the simulated cell {}", configured ? "" : "no configuration: ", config.cell);
 }
