@@ -70,8 +70,8 @@ class ViewChooser {
                                                   int certificate_samples_max = 1000,
                                                   const GainSampling& sampling = {});
 
-  /// The view with the highest gain for each second that a certified path leads to; the same arguments give the same
-  /// choice with any number of workers. With `after_look` it says kNothingReachable where it cannot foresee the look,
+  /// The view with the highest gain for each second that a certified path leads to; the same calls give the same
+  /// choices with any number of workers. With `after_look` it says kNothingReachable where it cannot foresee the look,
   /// and counts for nothing until adopt(). Errors: kStartBlocked when `current` is not free.
   [[nodiscard]] Result<ViewChoice> choose(const ViewContext& context, const JointVector& current,
                                           const ExploreOptions& options, RunParallel run_parallel);

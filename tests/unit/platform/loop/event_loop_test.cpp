@@ -112,7 +112,7 @@ TEST_CASE("a turn: sources in order of registration, completions, timers, time j
   CHECK(watchdog.last() == Instant{} + milliseconds(40));
 }
 
-TEST_CASE("a timer that a handler of the same turn cancels does not fire, one set for now fires") {
+TEST_CASE("a timer that a handler of the same turn cancels does not fire, one that is due at once fires") {
   House house;
   EventLoop loop(house.clock, nullptr, house, house.timers, house.jobs);
   Ticker ticker(16, milliseconds(10), 1);
