@@ -11,6 +11,7 @@
 #include "app/config/device_keys.hpp"
 #include "app/machine/job_types.hpp"
 #include "platform/loop/worker_pool.hpp"
+#include "platform/memory/budget.hpp"
 
 namespace firstlook {
 namespace {
@@ -20,6 +21,8 @@ constexpr std::string_view kArmModels[] = {"ur3", "ur5", "ur10", "ur3e", "ur5e",
 constexpr std::string_view kMountings[] = {"upright", "tilted"};
 constexpr std::string_view kViews[] = {"firstlook", "thesis2014"};
 constexpr std::string_view kHoles[] = {"ignore", "clear_when_corroborated"};
+
+constexpr std::size_t kColorPixelsMax = memory::budget_row(memory::Pool::kColorFrames).bytes_each;
 
 /// Every seed that a double of result.json's readers can hold exactly.
 constexpr double kSeedMax = 9007199254740992.0;
@@ -527,6 +530,9 @@ std::string broken_rule(const Config& c) {
   }
   if (std::string rule = broken_fine_map_rule(c.map); !rule.empty()) return rule;
   if (std::string rule = broken_panel_rule(c.panel); !rule.empty()) return rule;
+  if (static_cast<std::size_t>(c.camera.width) * static_cast<std::size_t>(c.camera.height) > kColorPixelsMax) {
+    return fmt::format("camera.width times camera.height must not exceed {} pixels (1920 x 1080)", kColorPixelsMax);
+  }
   if (!planes_from_words(c.map.planes)) return "map.planes must be none, or color, label, sensor with commas between";
   if (c.depth.crop_m > 0 && c.depth.crop_m <= c.depth.range_min_m) return "depth.crop_m must exceed depth.range_min_m";
   if (c.depth.filter_voxel_m > 0 && c.depth.filter_voxel_m < 0.005) {

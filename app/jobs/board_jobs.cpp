@@ -53,6 +53,15 @@ Status Workbench::read_picture(const hal::Frame& frame) {
   return color_.read(frame, {gray_.items().data(), camera.width, camera.height});
 }
 
+/// The pictures of the frames after number `f`, each in its place.
+std::vector<Workbench::GrayPixels> Workbench::read_after(std::span<const PosedFrame> frames, std::size_t f) {
+  std::vector<GrayPixels> pictures(frames.size());
+  for (++f; f < frames.size(); ++f) {
+    if (read_picture(frames[f].frame)) pictures[f].assign(gray_.items().begin(), gray_.items().end());
+  }
+  return pictures;
+}
+
 /// Of the picture that was read last.
 Result<CornerSet> Workbench::corners_of(const hal::Frame& frame, int target) {
   const BoardSpec& board = this->board(target);
@@ -73,17 +82,27 @@ Result<CornerSet> Workbench::corners_of(const hal::Frame& frame, int target) {
 
 BoardSight Workbench::sight_of(const DetectArguments& arguments) {
   std::vector<std::vector<CornerSet>> found(boards_.size());
+  std::vector<GrayPixels> ahead;  // read before their turn; empty ones are gone
+  std::size_t gone = 0;
   for (std::size_t f = 0; f < arguments.frames.size(); ++f) {
     const hal::Frame& frame = arguments.frames[f].frame;
-    if (!read_picture(frame)) continue;
+    if (ahead.empty() ? !read_picture(frame) : ahead[f].empty()) {
+      ++gone;
+      continue;
+    }
+    const bool first = ahead.empty();
+    if (!first) std::ranges::copy(ahead[f], gray_.items().begin());
     for (std::size_t k = 0; k < boards_.size(); ++k) {
       // A board that is not in the first frame of a standing arm is not in the others.
-      if (f > 0 && found[k].empty()) continue;
+      if (!first && found[k].empty()) continue;
       if (auto corners = corners_of(frame, static_cast<int>(k))) found[k].push_back(std::move(*corners));
     }
     if (std::ranges::all_of(found, &std::vector<CornerSet>::empty)) break;
+    // To search a large picture takes longer than a camera holds the next ones.
+    if (first) ahead = read_after(arguments.frames, f);
   }
   BoardSight sight;
+  if (2 * gone > arguments.frames.size()) sight.still = false;  // it says nothing: look again
   for (std::size_t k = 0; k < boards_.size(); ++k) {
     if (found[k].empty() || found[k].size() * 2 < arguments.frames.size()) continue;  // not even half of the frames
     if (auto picture = judge_standing(found[k])) {

@@ -232,6 +232,8 @@ class Workbench {
   [[nodiscard]] std::optional<SeenPose> seen_pose(const WaySight& sight) const;
   /// Reads the frame's pixels, unless the camera finds the corners itself.
   [[nodiscard]] Status read_picture(const hal::Frame& frame);
+  using GrayPixels = std::vector<std::uint8_t>;
+  [[nodiscard]] std::vector<GrayPixels> read_after(std::span<const PosedFrame> frames, std::size_t f);
   [[nodiscard]] Result<CornerSet> corners_of(const hal::Frame& frame, int target);
   [[nodiscard]] BoardSight sight_of(const DetectArguments& arguments);
   void keep_picture(std::size_t stop);

@@ -33,7 +33,7 @@ class FrameStream {
   /// The newest frame with stamp <= now that was not yet taken. Empty when none came since the last call.
   [[nodiscard]] virtual std::optional<Frame> poll(Instant now) = 0;
   [[nodiscard]] virtual Instant next_due() const = 0;
-  /// A device holds the last 32 frames at least; an older one gives kFrameGone.
+  /// A device holds its last frames (32; large pictures 6 at least); an older one gives kFrameGone.
   [[nodiscard]] virtual StreamCounters counters() const = 0;
 };
 

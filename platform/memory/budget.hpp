@@ -56,7 +56,7 @@ inline constexpr std::array kBudget = {
     BudgetRow{Pool::kDistanceField,    "distance field",      1,  16 * kMiB,        "map strand",  "distance and sweep buffers for the same grid"},
     BudgetRow{Pool::kGuardianSnapshot, "guardian snapshots",  2,  4 * kMiB,         "loop",        "the map as the guardian checks it, and the next one being written"},
     BudgetRow{Pool::kDepthFrames,      "depth frames",        3,  640 * 480 * 2,    "jobs",        "one being captured, one being integrated, one for the report"},
-    BudgetRow{Pool::kColorFrames,      "colour frames",       4,  640 * 480,        "jobs",        "grey images: captured, detected, first of a pair, report"},
+    BudgetRow{Pool::kColorFrames,      "colour frames",       4,  1920 * 1080,      "jobs",        "a grey picture, and one in colours, of a camera of full HD"},
     BudgetRow{Pool::kPlannerNodes,     "planner nodes",       2,  2 * kMiB,         "jobs",        "two trees of RRT-Connect"},
     BudgetRow{Pool::kViewCandidates,   "view candidates",     1,  4 * kMiB,         "jobs",        "configurations, what rays meet and the room around it, visibility masks"},
     BudgetRow{Pool::kEventQueue,       "event queue",         1,  1280 * kKiB,      "loop",        "64 events of 16 KiB with their heads"},
@@ -68,7 +68,7 @@ inline constexpr std::array kBudget = {
     BudgetRow{Pool::kThreadStacks,     "thread stacks",       kThreadsMax, kThreadStackBytes, "all", "created at boot"},
     BudgetRow{Pool::kJobHeap,          "job heap allowance",  2,  kJobHeapBytes,    "jobs",        "what OpenCV and Eigen allocate inside a job; more fails the job"},
     BudgetRow{Pool::kLibraryPages,     "library pages",       1,  45 * kMiB,        "all",         "code and data of the shared libraries under mlockall, as measured"},
-    BudgetRow{Pool::kColorSlots,       "colour camera slots", 32, 640 * 480 * 2,    "loop",        "the last frames of a real camera, as its driver gave them; none in a simulated cell"},
+    BudgetRow{Pool::kColorSlots,       "colour camera slots", 6,  1920 * 1080 * 2,  "loop",        "the last frames of a real camera, as its driver gave them: 6 of full HD, 32 of 640 x 480; none in a simulated cell"},
     BudgetRow{Pool::kDepthSlots,       "depth camera slots",  32, 640 * 480 * 2,    "loop",        "the same of a real depth camera"},
 };
 // clang-format on

@@ -182,6 +182,8 @@ TEST_CASE("a key given twice is refused", "[config]") {
 TEST_CASE("rules between keys hold", "[config]") {
   CHECK_THAT(refused("map: {low_m: [2, -1, 0]}", Fault::kConfigBadValue), Contains("map.low_m"));
   CHECK_THAT(refused("depth: {range_min_m: 3.5}", Fault::kConfigBadValue), Contains("range_trusted_m"));
+  CHECK(parse_config("camera: {width: 1920, height: 1080}", "cart.yaml").has_value());
+  CHECK_THAT(refused("camera: {width: 1920, height: 1200}", Fault::kConfigBadValue), Contains("2073600 pixels"));
   CHECK_THAT(refused("depth: {range_max_m: 2}", Fault::kConfigBadValue), Contains("range_max_m"));
   CHECK_THAT(refused("depth: {crop_m: 0.4}", Fault::kConfigBadValue), Contains("crop_m"));
   CHECK_THAT(refused("depth: {filter_voxel_m: 0.001}", Fault::kConfigBadValue), Contains("filter_voxel_m"));

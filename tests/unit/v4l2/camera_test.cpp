@@ -177,6 +177,37 @@ TEST_CASE("the last 32 frames are held", "[v4l2][camera]") {
   CHECK(gone.error().fault == Fault::kFrameGone);
 }
 
+TEST_CASE("pictures up to full HD are held, 6 of them; larger ones are refused with the numbers", "[v4l2][camera]") {
+  V4l2CameraOptions options = small_camera();
+  options.capture.width = options.intrinsics.width = 1920;
+  options.capture.height = options.intrinsics.height = 1080;
+  SECTION("full HD") {
+    Rig rig(options);
+    rig.kernel.picture = [](std::uint32_t n) {
+      return std::vector<std::uint8_t>(std::size_t{2} * 1920 * 1080, static_cast<std::uint8_t>(16 + n));
+    };
+    rig.run(1);
+    const std::size_t n = rig.frames.size();
+    REQUIRE(n > 10);
+    std::vector<std::uint8_t> pixels(std::size_t{1920} * 1080);
+    const ImageView<std::uint8_t> view{pixels.data(), 1920, 1080};
+    for (std::size_t back = 1; back <= 6; ++back) CHECK(rig.camera->read(rig.frames[n - back], view).has_value());
+    const Status gone = rig.camera->read(rig.frames[n - 7], view);
+    REQUIRE_FALSE(gone.has_value());
+    CHECK(gone.error().fault == Fault::kFrameGone);
+  }
+  SECTION("more") {
+    memory::reset_accounts();
+    options.capture.width = 2560;
+    test::SimulatedV4l2Kernel kernel;
+    const auto refused = V4l2Camera::make(kernel, options);
+    REQUIRE_FALSE(refused.has_value());
+    CHECK(refused.error().fault == Fault::kOutOfMemory);
+    CHECK(refused.error().detail() ==
+          "colour camera slots: frames of 5529600 bytes; the largest that fit have 4147200");
+  }
+}
+
 TEST_CASE("the granted format is used, padding and all, one of another size is refused by name", "[v4l2][camera]") {
   Rig rig;
   SECTION("longer rows") {

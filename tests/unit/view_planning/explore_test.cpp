@@ -169,6 +169,32 @@ TEST_CASE("what was good and not chosen stands for the next choice", "[explore]"
   CHECK(remembering > 1.01 * forgetting);
 }
 
+TEST_CASE("what was good before a look that was foreseen stands once the arm goes for the choice", "[explore]") {
+  SmallWorld world(room_with_wall());
+  look_from_two_places(world);
+  ViewChooser going(world.map.geometry(), world.sensor, 10, 1, 300);
+  ViewChooser staying(world.map.geometry(), world.sensor, 10, 1, 300);
+  ExploreOptions options;
+  options.refined = 0;
+  options.certificate_samples = 300;
+  options.after_look = true;
+  const auto foreseen = going.choose(world.context(), world.q, options, run_serially);
+  const auto same = staying.choose(world.context(), world.q, options, run_serially);
+  REQUIRE(foreseen);
+  REQUIRE(same);
+  REQUIRE(foreseen->outcome == ViewChoice::Outcome::kChosen);
+  going.adopt(foreseen->gain, going.gain().unknown(), options.gain_min);
+  options.after_look = false;
+  options.step = 1;
+  const auto with = going.choose(world.context(), world.q, options, run_serially);
+  const auto without = staying.choose(world.context(), world.q, options, run_serially);
+  REQUIRE(with);
+  REQUIRE(without);
+  REQUIRE(without->outcome == ViewChoice::Outcome::kChosen);
+  CHECK(with->considered > without->considered);  // each that stands is one more
+  CHECK(with->utility_per_s >= without->utility_per_s);
+}
+
 TEST_CASE("an arm with no room to move says that nothing can be reached", "[explore]") {
   SmallWorld world(Truth::room());
   ViewChooser chooser(world.map.geometry(), world.sensor, 100, 1, 300);
