@@ -22,7 +22,12 @@ std::vector<ConfigKey> camera_keys(Config::Camera& k) {
        {},
        "colour camera on V4L2 by its stable path, /dev/v4l/by-id/...; freenect: that of a Kinect v1, in grey "
        "values; none: the simulated cell's"});
-  keys.push_back({"camera.width", &k.width, 160, 4096, {}, "of its pictures, 1920 x 1080 pixels at most in all; intrinsics hold for one size only"});
+  keys.push_back({"camera.width",
+                  &k.width,
+                  160,
+                  4096,
+                  {},
+                  "of its pictures, 1920 x 1080 pixels at most in all; intrinsics hold for one size only"});
   keys.push_back({"camera.height", &k.height, 120, 4096, {}, "of its pictures"});
   keys.push_back(
       {"camera.format", &k.format, 0, 0, kFormats, "of its pixels; auto: the first of these that it grants"});
