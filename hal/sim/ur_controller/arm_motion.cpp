@@ -12,7 +12,8 @@ constexpr double kScaleRamp_1_s = 4;  // the slider takes effect within a quarte
 constexpr double kHoldRamp_1_s = 8;   // a pause within an eighth
 constexpr double kSpeedMargin = 1.2;  // above the nominal joint speed the controller stops protectively
 constexpr double kServoAcceleration_rad_s2 = 40;
-constexpr double kSameConfiguration_rad = 0.3;  // between two cycles on a line
+constexpr double kSameConfiguration_rad = 0.3;  // between two cycles on a line, or over a blend
+constexpr double kBrakingMin_s = 1e-3;          // what is left of braking, to divide by
 
 /// A trapezoid over `way` of unit 1, or the one that takes `time_s`.
 JointMotion along(double way, double speed, double acceleration, double time_s, const JointVector& from,
@@ -65,26 +66,63 @@ void ArmMotion::come_to_rest() {
 ArmMotion::Ticket ArmMotion::begin(Mode mode) {
   mode_ = mode;
   led_ = mode == Mode::kLed;
-  path_time_s_ = 0;
+  leaving_.reset();
   return ++ticket_;
 }
 
-ArmMotion::Ticket ArmMotion::movej(const JointVector& target_rad, double speed_rad_s, double acceleration_rad_s2,
-                                   double time_s) {
-  const double way_rad = (target_rad - position_rad_).max_abs();
-  path_ = along(way_rad, speed_rad_s, acceleration_rad_s2, time_s, position_rad_, target_rad);
-  return begin(Mode::kJointPath);
+ArmMotion::Ticket ArmMotion::begin(Track path) {
+  std::optional<Track> leaving;
+  if (blending()) leaving = std::move(path_);
+  path_ = std::move(path);
+  const Ticket ticket = begin(Mode::kPath);
+  leaving_ = std::move(leaving);
+  return ticket;
 }
 
-ArmMotion::Ticket ArmMotion::movel(const Pose& base_T_flange, double speed_m_s, double acceleration_m_s2,
-                                   double time_s) {
-  line_from_ = forward(arm_, position_rad_).flange().pose();
-  line_to_ = base_T_flange;
-  const double way_m = (line_to_.translation() - line_from_.translation()).norm();
-  const double turn_rad = rotation_vector_of(line_from_.linear().transpose() * line_to_.linear()).norm();
-  const double way = std::max(way_m, turn_rad);  // a turn in place takes a radian for a metre
-  path_ = along(way, speed_m_s, acceleration_m_s2, time_s, JointVector{0}, JointVector{way});
-  return begin(Mode::kLinePath);
+/// The acceleration of a path that blends with the one before: while that one brakes, both together are no faster than
+/// the faster of them.
+double ArmMotion::gentle(double speed, double acceleration) const {
+  if (!blending()) return acceleration;
+  return std::min(acceleration, speed / std::max(path_.motion.duration_s() - path_.time_s, kBrakingMin_s));
+}
+
+ArmMotion::Ticket ArmMotion::movej(const JointVector& target_rad, double speed_rad_s, double acceleration_rad_s2,
+                                   double time_s, const Blend& blend) {
+  const JointVector from_rad = path_end_rad();
+  const double way_rad = (target_rad - from_rad).max_abs();
+  return begin(Track{
+      .motion = along(way_rad, speed_rad_s, gentle(speed_rad_s, acceleration_rad_s2), time_s, from_rad, target_rad),
+      .tool = {},
+      .blend = blend,
+      .at_rad = from_rad,
+      .end_rad = target_rad});
+}
+
+ArmMotion::Ticket ArmMotion::follow(const ToolPath& path, double speed_m_s, double acceleration_m_s2, double time_s,
+                                    const Blend& blend) {
+  const double way = path.way();
+  Track track{
+      .motion = along(way, speed_m_s, gentle(speed_m_s, acceleration_m_s2), time_s, JointVector{0}, JointVector{way}),
+      .tool = path,
+      .blend = blend,
+      .at_rad = path_end_rad(),
+      .end_rad = {}};
+  if (blend.radius_m > 0) {
+    const auto end_rad = joints_of(path.end(), blend, track.at_rad);
+    if (end_rad) track.end_rad = *end_rad;
+    if (!end_rad) track.blend.radius_m = 0;  // it will not get there
+  }
+  return begin(std::move(track));
+}
+
+bool ArmMotion::blending() const {
+  if (mode_ != Mode::kPath || held_ || !(path_.blend.radius_m > 0) || leaving_) return false;
+  if (path_.time_s < path_.motion.duration_s() - path_.motion.phases.back().duration_s) return false;
+  if ((path_.end_rad - path_.at_rad).max_abs() > kSameConfiguration_rad) return false;
+  const auto tool_at = [this](const JointVector& q) {
+    return Eigen::Vector3d(forward(arm_, q).flange().pose() * path_.blend.flange_T_tcp.translation());
+  };
+  return (tool_at(path_.end_rad) - tool_at(path_.at_rad)).norm() <= path_.blend.radius_m;
 }
 
 void ArmMotion::servoj(const JointVector& target_rad, double lookahead_s) {
@@ -108,7 +146,11 @@ void ArmMotion::speedl(const Vector6& twist, double acceleration_m_s2) {
 bool ArmMotion::lead(const JointVector& target_rad, double speed_rad_s, double acceleration_rad_s2) {
   if (mode_ != Mode::kRest) return false;
   const double way_rad = (target_rad - position_rad_).max_abs();
-  path_ = along(way_rad, speed_rad_s, acceleration_rad_s2, 0, position_rad_, target_rad);
+  path_ = Track{.motion = along(way_rad, speed_rad_s, acceleration_rad_s2, 0, position_rad_, target_rad),
+                .tool = {},
+                .blend = {},
+                .at_rad = position_rad_,
+                .end_rad = target_rad};
   static_cast<void>(begin(Mode::kLed));
   scale_ = 1;
   return true;
@@ -167,34 +209,50 @@ JointVector ArmMotion::flange_speed(std::optional<MotionFault>& fault) const {
   return speed_rad_s;
 }
 
-JointVector ArmMotion::next_on_line(std::optional<MotionFault>& fault) const {
-  const double way = path_.final_s > 0 ? path_.direction_rad[0] : 0;
-  const double share = way > 0 ? path_.position_rad(Instant{} + seconds(path_time_s_))[0] / way : 1;
-  Pose at = Pose::Identity();
-  at.translation() = line_from_.translation() + share * (line_to_.translation() - line_from_.translation());
-  const Eigen::Quaterniond from(line_from_.linear()), to(line_to_.linear());
-  at.linear() = from.slerp(share, to).toRotationMatrix();
-  const InverseSolutions solutions = inverse(arm_, Transform<Base, Flange>(at), position_rad_);
-  const JointVector* nearest = nullptr;
-  for (const JointVector& q : solutions) {
-    if (nearest == nullptr || (q - position_rad_).max_abs() < (*nearest - position_rad_).max_abs()) nearest = &q;
+/// The posture with the tool there that is nearest to another one.
+std::optional<JointVector> ArmMotion::joints_of(const Pose& base_T_tcp, const Blend& blend,
+                                                const JointVector& near_rad) const {
+  const Pose base_T_flange = base_T_tcp * blend.flange_T_tcp.inverse(Eigen::Isometry);
+  std::optional<JointVector> nearest;
+  for (const JointVector& q : inverse(arm_, Transform<Base, Flange>(base_T_flange), near_rad)) {
+    if (!nearest || (q - near_rad).max_abs() < (*nearest - near_rad).max_abs()) nearest = q;
   }
-  if (nearest == nullptr || (*nearest - position_rad_).max_abs() > kSameConfiguration_rad) {
+  return nearest;
+}
+
+void ArmMotion::advance_on(Track& path, double step_s, std::optional<MotionFault>& fault) const {
+  path.time_s += step_s;
+  const JointVector along_rad = path.motion.position_rad(Instant{} + seconds(path.time_s));
+  if (!path.tool) {
+    path.at_rad = along_rad;
+    return;
+  }
+  const double way = path.motion.final_s > 0 ? path.motion.direction_rad[0] : 0;
+  const auto next_rad = joints_of(path.tool->at(way > 0 ? along_rad[0] / way : 1), path.blend, path.at_rad);
+  if (next_rad && (*next_rad - path.at_rad).max_abs() <= kSameConfiguration_rad) {
+    path.at_rad = *next_rad;
+  } else {
     fault = MotionFault::kOutOfReach;
-    return position_rad_;
   }
-  return *nearest;
+}
+
+/// Where two paths blend the arm is on the second one, and besides off it by what is left of the first.
+JointVector ArmMotion::next_on_path(double step_s, std::optional<MotionFault>& fault) {
+  advance_on(path_, step_s, fault);
+  if (!leaving_) return path_.at_rad;
+  advance_on(*leaving_, step_s, fault);
+  if (leaving_->time_s >= leaving_->motion.duration_s()) {
+    leaving_.reset();
+    return path_.at_rad;
+  }
+  return path_.at_rad + (leaving_->at_rad - leaving_->end_rad);
 }
 
 JointVector ArmMotion::next(double cycle_s, std::optional<MotionFault>& fault) {
   switch (mode_ == Mode::kStopping ? stopped_mode_ : mode_) {
-    case Mode::kJointPath:
+    case Mode::kPath:
     case Mode::kLed:
-      path_time_s_ += scale_ * cycle_s;
-      return path_.position_rad(Instant{} + seconds(path_time_s_));
-    case Mode::kLinePath:
-      path_time_s_ += scale_ * cycle_s;
-      return next_on_line(fault);
+      return next_on_path(scale_ * cycle_s, fault);
     default:
       break;
   }
@@ -278,8 +336,8 @@ std::optional<MotionFault> ArmMotion::advance(double cycle_s, double speed_fract
   velocity_rad_s_ = velocity_rad_s;
   position_rad_ = next_rad;
 
-  const bool on_path = mode_ == Mode::kJointPath || mode_ == Mode::kLinePath || mode_ == Mode::kLed;
-  if (on_path && path_time_s_ >= path_.duration_s()) come_to_rest();
+  const bool on_path = mode_ == Mode::kPath || mode_ == Mode::kLed;
+  if (on_path && !leaving_ && path_.time_s >= path_.motion.duration_s()) come_to_rest();
   if (mode_ == Mode::kStopping && standing()) come_to_rest();
   return std::nullopt;
 }

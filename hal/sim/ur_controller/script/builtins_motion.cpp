@@ -16,7 +16,8 @@ constexpr double kAcceleration_rad_s2 = 40;
 constexpr double kAccelerationMin = 0.01;  // of speedj and speedl
 constexpr const char* kInFreedrive = "The robot is in freedrive: it cannot follow a path";
 
-/// The arm is this thread's and stands; false while it does not, or when it is another's.
+/// The arm is this thread's and stands, or may go on from the blend at the end of its path; false while neither is so,
+/// or when it is another's.
 bool arm_ready(Call& c) {
   if (!c.machine().take_arm(c.thread())) {
     c.fail("Another thread is already controlling the robot");
@@ -24,10 +25,17 @@ bool arm_ready(Call& c) {
   }
   if (c.robot().teach_mode) c.fail(kInFreedrive);
   if (!c.ok()) return false;
-  if (!c.controller().motion().busy()) return true;
+  if (!c.controller().motion().busy() || c.controller().motion().blending()) return true;
   if (c.state().first) static_cast<void>(c.controller().motion().stop(kSwitch_rad_s2));
   c.wait();
   return false;
+}
+
+/// The tool's centre may leave the way within this radius of its end, given as argument `i`.
+Blend blend_of(Call& c, std::size_t i) {
+  const double radius_m = c.number(i);
+  if (radius_m < 0) c.fail("The blend radius must not be negative");
+  return {.radius_m = radius_m, .flange_T_tcp = c.controller().flange_T_tcp()};
 }
 
 /// Waits for a path; lets the arm go at its end.
@@ -58,9 +66,10 @@ void movej(Call& c) {
   check_limits(c, c.number(2), acceleration, time_s);
   if (!arm_ready(c)) return;
   const ArmMotion& motion = c.controller().motion();
+  const Blend blend = blend_of(c, 4);
   JointVector target_rad = JointVector::zero(6);
   if (c.value(0).as<PoseValue>() != nullptr) {
-    const auto joints = joints_at(c.controller(), c.pose(0), motion.position_rad());
+    const auto joints = joints_at(c.controller(), c.pose(0), motion.path_end_rad());
     if (!joints) return c.fail("getInverseKin: no solution");
     target_rad = *joints;
   } else {
@@ -69,35 +78,46 @@ void movej(Call& c) {
   if (!c.ok()) return;
   if (target_rad.max_abs() > 2 * M_PI) return c.fail("A target joint is out of its range");
   const ArmModel& arm = c.controller().identity().arm;
-  const double speed = allowed_speed(arm, target_rad - motion.position_rad(), std::max(c.number(2), 1e-6));
-  state.ticket = c.controller().motion().movej(target_rad, speed, acceleration, time_s);
+  const double speed = allowed_speed(arm, target_rad - motion.path_end_rad(), std::max(c.number(2), 1e-6));
+  state.ticket = c.controller().motion().movej(target_rad, speed, acceleration, time_s, blend);
   state.phase = 1;
   c.wait();
 }
 
-/// The tool straight to the pose of argument `i`; joints stand for the pose that they reach.
-void begin_line(Call& c, std::size_t i, double speed, double acceleration, double time_s) {
-  check_limits(c, speed, acceleration, time_s);
-  if (!arm_ready(c)) return;
-  const Pose base_T_tcp = c.value(i).as<List>() != nullptr ? c.controller().tcp_pose(c.joints(i)) : c.pose(i);
+/// Where argument `i` wants the tool's centre; joints stand for the pose that they reach.
+Pose tool_goal(Call& c, std::size_t i) {
+  return c.value(i).as<List>() != nullptr ? c.controller().tcp_pose(c.joints(i)) : c.pose(i);
+}
+
+void begin_path(Call& c, const ToolPath& path, double speed, double acceleration, double time_s, const Blend& blend) {
   if (!c.ok()) return;
-  const Pose base_T_flange = base_T_tcp * c.controller().flange_T_tcp().inverse(Eigen::Isometry);
-  c.state().ticket = c.controller().motion().movel(base_T_flange, std::max(speed, 1e-6), acceleration, time_s);
-  ++c.state().phase;
+  c.state().ticket = c.controller().motion().follow(path, std::max(speed, 1e-6), acceleration, time_s, blend);
+  c.state().phase = 1;
   c.wait();
 }
 
-void movel(Call& c) {
-  if (c.state().phase == 1) return follow(c);
-  begin_line(c, 0, c.number(2), c.number(1), c.number(3));
-}
+Pose tool_before(Call& c) { return c.controller().tcp_pose(c.controller().motion().path_end_rad()); }
 
-/// By way of the first pose to the second, on two lines instead of an arc.
+/// @param t, r  numbers of the arguments that are the time, if there is one, and the blend radius
+void move_on_line(Call& c, std::optional<std::size_t> t, std::size_t r) {
+  if (c.state().phase == 1) return follow(c);
+  const double time_s = t ? c.number(*t) : 0;
+  check_limits(c, c.number(2), c.number(1), time_s);
+  if (!arm_ready(c)) return;
+  begin_path(c, ToolPath::line(tool_before(c), tool_goal(c, 0)), c.number(2), c.number(1), time_s, blend_of(c, r));
+}
+void movel(Call& c) { move_on_line(c, 3, 4); }
+void movep(Call& c) { move_on_line(c, {}, 3); }
+
+/// Three points on a line are no circle: straight to the last one.
 void movec(Call& c) {
-  CallState& state = c.state();
-  if (state.phase == 2) return follow(c);
-  if (state.phase == 1 && !c.controller().motion().done(state.ticket)) return c.wait();
-  begin_line(c, state.phase == 0 ? 0 : 1, c.number(3), c.number(2), 0);
+  if (c.state().phase == 1) return follow(c);
+  check_limits(c, c.number(3), c.number(2), 0);
+  if (!arm_ready(c)) return;
+  const Pose from = tool_before(c), to = tool_goal(c, 1);
+  const auto turn = c.integer(5, 0, 1) == 1 ? ArcTurn::kWithTheCircle : ArcTurn::kSpread;
+  const auto arc = ToolPath::arc(from, tool_goal(c, 0).translation(), to, turn);
+  begin_path(c, arc ? *arc : ToolPath::line(from, to), c.number(3), c.number(2), 0, blend_of(c, 4));
 }
 
 /// servoj, speedj and speedl: the arm stays with the thread until it does something else.
@@ -163,6 +183,7 @@ void stop_arm(Call& c) {
 /// Hands may lead the arm from where the program has brought it to rest. Free axes and their frame are not looked at.
 void begin_freedrive(Call& c) {
   if (c.robot().teach_mode || !arm_ready(c)) return;
+  if (c.controller().motion().busy()) return c.wait();  // the end of a path that would have blended
   c.machine().release_arm(c.thread());
   c.controller().set_teach_mode(true);
 }
@@ -202,7 +223,7 @@ constexpr Builtin kTable[] = {
     {"movec", "pose_via,pose_to,a=1.2,v=0.25,r=0,mode=0", movec},
     {"movej", "q,a=1.4,v=1.05,t=0,r=0", movej},
     {"movel", "pose,a=1.2,v=0.25,t=0,r=0", movel},
-    {"movep", "pose,a=1.2,v=0.25,t=0,r=0", movel},
+    {"movep", "pose,a=1.2,v=0.25,r=0", movep},
     {"servoc", "pose,a=1.2,v=0.25,r=0", servoc_pose},
     {"servoj", "q,a=0,v=0,t=0,lookahead_time=0.1,gain=300", servoj},
     {"speedj", "qd,a=1.4,t=0", speedj},

@@ -94,7 +94,9 @@ void Machine::step() {
     threads_[i] = std::move(thread);
     if (killed) threads_[i].frames.clear();
   }
-  if (!end_ && threads_.front().frames.empty()) end_ = End::kFinished;
+  // A path that would have blended with the next one goes to its end.
+  const bool underway = !code_.secondary && controller_.motion().blending();
+  if (!end_ && threads_.front().frames.empty() && !underway) end_ = End::kFinished;
   remove_ended();
   if (!end_ && held() > kHeldMax) fail({}, "Out of memory");
 }

@@ -1,6 +1,10 @@
 #include "hal/sim/ur_controller/arm_motion.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
+
+#include "algorithms/kinematics/inverse_kinematics.hpp"
 
 namespace firstlook {
 using namespace sim::ur;
@@ -54,33 +58,123 @@ TEST_CASE("movej takes the time of its trapezoid, or the time that was asked for
   CHECK(arm.run_until_rest() == Approx(1).margin(0.003));
 }
 
-TEST_CASE("movel keeps the flange on a straight line", "[ur]") {
+TEST_CASE("a line keeps the tool's centre straight, whatever the tool turns by", "[ur]") {
   Arm arm;
-  const Pose from = forward(arm.model, arm.motion.position_rad()).flange().pose();
+  Blend tool;
+  tool.flange_T_tcp.translation() = Eigen::Vector3d(0.03, -0.02, 0.15);
+  const auto tcp = [&] {
+    return Pose(forward(arm.model, arm.motion.position_rad()).flange().pose() * tool.flange_T_tcp);
+  };
+  const Pose from = tcp();
   Pose to = from;
   to.translation() += Eigen::Vector3d(-0.05, 0.1, 0.08);
   to.linear() = to.linear() * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()).toRotationMatrix();
   const Eigen::Vector3d way = to.translation() - from.translation();
-  static_cast<void>(arm.motion.movel(to, 0.1, 0.5, 0));
+  static_cast<void>(arm.motion.follow(ToolPath::line(from, to), 0.1, 0.5, 0, tool));
   double off_line_m = 0, time_s = 0;
   while (arm.motion.busy()) {
     REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
     time_s += kCycle_s;
-    const Eigen::Vector3d at =
-        forward(arm.model, arm.motion.position_rad()).flange().translation() - from.translation();
+    const Eigen::Vector3d at = tcp().translation() - from.translation();
     off_line_m = std::max(off_line_m, (at - way * (at.dot(way) / way.squaredNorm())).norm());
   }
   CHECK(off_line_m < 1e-8);
   CHECK(time_s == Approx(std::max(way.norm(), 0.2) / 0.1 + 0.1 / 0.5).margin(0.003));
-  const Pose reached = forward(arm.model, arm.motion.position_rad()).flange().pose();
-  CHECK((reached.matrix() - to.matrix()).norm() < 1e-7);
+  CHECK((tcp().matrix() - to.matrix()).norm() < 1e-7);
+}
+
+TEST_CASE("an arc goes through its three points on their circle", "[ur]") {
+  Pose from = Pose::Identity(), to = from;
+  from.translation() = Eigen::Vector3d(0.3, 0.1, 0.2);
+  to.translation() = Eigen::Vector3d(0.4, 0.2, 0.2);  // a quarter about (0.3, 0.2, 0.2), or three the other way
+  to.linear() = Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Vector3d center(0.3, 0.2, 0.2);
+  for (const bool near : {true, false}) {
+    const Eigen::Vector3d via = near ? center + Eigen::Vector3d(0.06, -0.08, 0) : Eigen::Vector3d(0.2, 0.2, 0.2);
+    const auto arc = ToolPath::arc(from, via, to, ArcTurn::kSpread);
+    REQUIRE(arc);
+    const double angle_rad = near ? M_PI / 2 : 3 * M_PI / 2;
+    CHECK(arc->way() == Approx(std::max(0.1 * angle_rad, 0.4)));
+    CHECK((arc->end().matrix() - to.matrix()).norm() < 1e-12);
+    double nearest_to_via_m = 1;
+    for (int i = 0; i <= 1000; ++i) {
+      const Eigen::Vector3d at = arc->at(i / 1000.0).translation();
+      CHECK((at - center).norm() == Approx(0.1));
+      nearest_to_via_m = std::min(nearest_to_via_m, (at - via).norm());
+    }
+    CHECK(nearest_to_via_m < 5e-4);
+    const auto fixed = ToolPath::arc(from, via, to, ArcTurn::kWithTheCircle);
+    REQUIRE(fixed);
+    CHECK(fixed->way() == Approx(0.1 * angle_rad));
+    const Eigen::AngleAxisd turn(near ? angle_rad : -angle_rad, Eigen::Vector3d::UnitZ());
+    CHECK((fixed->end().linear() - turn.toRotationMatrix()).norm() < 1e-12);
+  }
+  const Eigen::Vector3d between = (from.translation() + to.translation()) / 2;
+  CHECK_FALSE(ToolPath::arc(from, between, to, ArcTurn::kSpread));
+  CHECK_FALSE(ToolPath::arc(from, from.translation(), to, ArcTurn::kSpread));
+  CHECK_FALSE(ToolPath::arc(from, between, from, ArcTurn::kSpread));
+}
+
+TEST_CASE("paths that blend go on without a stop, within the radius of the corner and no faster", "[ur]") {
+  const double radius_m = GENERATE(0.01, 0.03, 0.3);
+  const bool tool_path = GENERATE(true, false);
+  Arm arm;
+  const Blend blend{.radius_m = radius_m, .flange_T_tcp = Pose::Identity()};
+  const auto at = [&](const JointVector& q) { return forward(arm.model, q).flange().pose(); };
+  const Pose from = at(arm.motion.position_rad());
+  Pose corner = from, to = from;
+  corner.translation() += Eigen::Vector3d(-0.1, 0, 0);
+  to.translation() += Eigen::Vector3d(-0.1, 0.1, 0);
+  const auto joints = [&](const Pose& pose) {
+    const InverseSolutions all = inverse(arm.model, Transform<Base, Flange>(pose), arm.motion.position_rad());
+    return *std::ranges::min_element(all, {},
+                                     [&](const JointVector& q) { return (q - arm.motion.position_rad()).max_abs(); });
+  };
+  const JointVector corner_rad = joints(corner), to_rad = joints(to);
+  const auto first = tool_path ? arm.motion.follow(ToolPath::line(from, corner), 0.1, 0.5, 0, blend)
+                               : arm.motion.movej(corner_rad, 0.3, 1, 0, blend);
+  while (!arm.motion.done(first)) REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
+  REQUIRE(arm.motion.blending());
+  CHECK((arm.motion.path_end_rad() - corner_rad).max_abs() < 1e-6);
+  CHECK((at(arm.motion.position_rad()).translation() - corner.translation()).norm() <= radius_m);
+  const auto second = tool_path ? arm.motion.follow(ToolPath::line(corner, to), 0.1, 5, 0, {})
+                                : arm.motion.movej(to_rad, 0.3, 5, 0, {});
+  double slowest_rad_s = 10, fastest_rad_s = 0, fastest_m_s = 0, off_m = 0;
+  Eigen::Vector3d before = at(arm.motion.position_rad()).translation();
+  while (!arm.motion.done(second)) {
+    REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
+    const Eigen::Vector3d now = at(arm.motion.position_rad()).translation();
+    const double speed_rad_s = arm.motion.velocity_rad_s().max_abs();
+    if ((now - to.translation()).norm() > 0.05) slowest_rad_s = std::min(slowest_rad_s, speed_rad_s);
+    fastest_rad_s = std::max(fastest_rad_s, speed_rad_s);
+    fastest_m_s = std::max(fastest_m_s, (now - before).norm() / kCycle_s);
+    before = now;
+    const bool beyond = (now - corner.translation()).norm() > radius_m;
+    if (tool_path && beyond) off_m = std::max(off_m, std::abs(now.x() - corner.translation().x()));
+  }
+  CHECK(slowest_rad_s > 0.03);  // no stop at the corner
+  if (tool_path) CHECK(fastest_m_s < 0.1001);
+  if (!tool_path) CHECK(fastest_rad_s < 0.3001);
+  CHECK(off_m < 1e-3);
+  CHECK((arm.motion.position_rad() - to_rad).max_abs() < 1e-6);
+}
+
+TEST_CASE("a path that nothing blends with goes to its end", "[ur]") {
+  Arm arm;
+  const JointVector target = arm.ahead(0.5);
+  const auto ticket = arm.motion.movej(target, 0.5, 1, 0, {.radius_m = 0.05, .flange_T_tcp = Pose::Identity()});
+  while (!arm.motion.done(ticket)) REQUIRE_FALSE(arm.motion.step(kCycle_s, 1));
+  CHECK(arm.motion.busy());
+  arm.run_until_rest();
+  CHECK((arm.motion.position_rad() - target).max_abs() < 1e-12);
 }
 
 TEST_CASE("a line that leaves the reach is a fault, and the arm stands", "[ur]") {
   Arm arm;
   Pose to = forward(arm.model, arm.motion.position_rad()).flange().pose();
   to.translation().x() += 2;
-  static_cast<void>(arm.motion.movel(to, 1, 2, 0));
+  static_cast<void>(
+      arm.motion.follow(ToolPath::line(forward(arm.model, arm.motion.position_rad()).flange().pose(), to), 1, 2, 0));
   std::optional<MotionFault> fault;
   for (int i = 0; i < 5000 && !fault; ++i) fault = arm.motion.step(kCycle_s, 1);
   REQUIRE(fault);

@@ -333,6 +333,40 @@ end
   CHECK(robot.state().tcp_pose[2] != pose[2]);
 }
 
+TEST_CASE("paths of a script blend, bend and end where they should", "[ur][script]") {
+  // Up, aside and back: two lines, an arc, a line that would blend with what does not come.
+  const auto program = [](const char* radius) {
+    return std::string(
+               "def prog():\n  set_tcp(p[0.02, 0, 0.1, 0, 0, 0])\n  sleep(0.1)\n  a = get_actual_tcp_pose()\n"
+               "  movel(pose_add(a, p[0, 0, 0.05, 0, 0, 0]), v=0.2, r=") +
+           radius + ")\n  movep(pose_add(a, p[0, 0.05, 0.05, 0, 0, 0]), 1.2, 0.2, " + radius +
+           ")\n  textmsg(\"aside\")\n  movec(pose_add(a, p[0.025, 0.025, 0.05, 0, 0, 0]), pose_add(a, p[0, 0, 0.05, 0, "
+           "0, "
+           "0]), v=0.2)\n  textmsg(\"back\")\n  movel(a, r=0.04)\nend\n";
+  };
+  double took_s[2] = {};
+  for (const bool blends : {false, true}) {
+    ScriptRobot robot;
+    const JointVector start_rad = robot.robot.controller().motion().position_rad();
+    robot.send(program(blends ? "0.02" : "0"), 0.05);
+    const Vector6 from = robot.state().tcp_pose;
+    double aside_most_m = 0, bulge_m = 0;
+    while (robot.state().runtime != RuntimeState::kStopped && took_s[blends ? 1 : 0] < 20) {
+      robot.listen(0.01);
+      took_s[blends ? 1 : 0] += 0.01;
+      aside_most_m = std::max(aside_most_m, robot.state().tcp_pose[1] - from[1]);
+      bulge_m = std::max(bulge_m, robot.state().tcp_pose[0] - from[0]);
+    }
+    CHECK(robot.exceptions.empty());
+    CHECK(robot.texts == std::vector<std::string>{"aside", "back"});
+    if (!blends) CHECK(aside_most_m == Approx(0.05).margin(1e-6));
+    if (blends) CHECK(aside_most_m < 0.05);
+    CHECK(bulge_m > 0.02);
+    CHECK((robot.robot.controller().motion().position_rad() - start_rad).max_abs() < 1e-6);
+  }
+  CHECK(took_s[1] < took_s[0] - 0.1);
+}
+
 TEST_CASE("one thread moves the arm at a time", "[ur][script]") {
   ScriptRobot robot;
   robot.send(R"(def prog():
