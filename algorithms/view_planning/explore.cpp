@@ -195,6 +195,16 @@ bool ViewChooser::worthwhile(const Task& task, const Candidate& candidate) {
          (gain.unknown - gain.doubtful >= task.options.gain_min || gain.again - gain.doubtful_again >= task.again_min);
 }
 
+/// Gain for each second; 0 when the view is not worth its time.
+double ViewChooser::utility_per_s(const Task& task, const ViewGain& gain, double move_s) {
+  const ViewTiming& timing = task.options.timing;
+  const double all_s = move_s + timing.settle_s + timing.look_s;
+  const bool tells = gain.unknown - gain.doubtful >= task.options.gain_min;
+  const double again_min = task.options.again_per_m * timing.limits.body_speed_m_s * all_s;
+  if (!tells && gain.again - gain.doubtful_again < again_min) return 0;
+  return gain.weight() / all_s;
+}
+
 /// What a free candidate promises at most: its gain, and for one that may be worth a view its utility.
 void ViewChooser::estimate(const Task& task, Candidate& candidate, GainWorker& worker) const {
   const ViewTiming& timing = task.options.timing;
@@ -203,7 +213,7 @@ void ViewChooser::estimate(const Task& task, Candidate& candidate, GainWorker& w
   if (candidate.exact) return;
   const double move_s =
       least_duration_s(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits);
-  candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
+  candidate.utility_per_s = utility_per_s(task, candidate.gain, move_s);
 }
 
 void ViewChooser::make_exact(const Task& task, Candidate& candidate, GainWorker& worker) const {
@@ -215,7 +225,7 @@ void ViewChooser::make_exact(const Task& task, Candidate& candidate, GainWorker&
   if (!worthwhile(task, candidate)) return;
   const double move_s =
       time_segment(task.context.arm, task.context.body.capsules, task.current, candidate.q, timing.limits).duration_s;
-  candidate.utility_per_s = candidate.gain.weight() / (move_s + timing.settle_s + timing.look_s);
+  candidate.utility_per_s = utility_per_s(task, candidate.gain, move_s);
 }
 
 void ViewChooser::score(const Task& task, RunParallel run_parallel) {
@@ -335,7 +345,7 @@ Status ViewChooser::plan_best(const Task& task, ViewChoice& choice) {
       unreached_.push_back(static_cast<int>(candidate - candidates_.data()));
       continue;
     }
-    const double utility = candidate->gain.weight() / (path->duration_s + timing.settle_s + timing.look_s);
+    const double utility = utility_per_s(task, candidate->gain, path->duration_s);
     if (utility <= choice.utility_per_s) continue;
     choice.outcome = ViewChoice::Outcome::kChosen;
     choice.target = candidate->q;

@@ -18,6 +18,7 @@ struct ExploreOptions {
   std::uint32_t gain_min = 8;               ///< unknown voxels that make a view worth it (k of the certificate)
   std::uint32_t again_min = 100;            ///< or voxels that it makes usable for motion
   std::uint32_t again_few = 30;             ///< the same while such views still open the way to something unknown
+  double again_per_m = 40;                  ///< and so many for each metre that the body could go in the view's time
   int refined = 16;                         ///< of the best candidates, each improved in small steps
   int refine_steps = 16;                    ///< tried for one of them
   int plans_max = 24;                       ///< candidates that the planner may try; twice as many for the certificate
@@ -127,6 +128,7 @@ class ViewChooser {
   [[nodiscard]] Result<ViewChoice> search(const ViewContext& context, const JointVector& current,
                                           const ExploreOptions& options, RunParallel run_parallel);
   [[nodiscard]] static bool worthwhile(const Task& task, const Candidate& candidate);
+  [[nodiscard]] static double utility_per_s(const Task& task, const ViewGain& gain, double move_s);
   [[nodiscard]] bool is_worse(int a, int b) const;
   void rank(const Task& task);
   [[nodiscard]] const Candidate* next_best(const Task& task);

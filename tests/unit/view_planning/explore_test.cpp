@@ -145,6 +145,34 @@ TEST_CASE("small steps from the best candidates find better views", "[explore]")
   CHECK(with > 1.1 * without);
 }
 
+TEST_CASE("a view that only makes room for motion is taken when it does so quickly", "[explore]") {
+  SmallWorld world(room_with_wall());
+  look_from_two_places(world);
+  ViewChooser chooser(world.map.geometry(), world.sensor, 320, 2);
+  ExploreOptions options;
+  options.again_min = options.again_few = 1;
+  options.gain_min = 1'000'000;  // nothing tells enough: room is all that counts
+  const auto rate = [&](const ViewChoice& choice) {
+    const double s = choice.path.duration_s + options.timing.settle_s + options.timing.look_s;
+    return (choice.gain.again - choice.gain.doubtful_again) / (options.timing.limits.body_speed_m_s * s);
+  };
+  options.again_per_m = 0;
+  const auto any = chooser.choose(world.context(), world.q, options, run_on_two);
+  REQUIRE(any);
+  REQUIRE(any->outcome == ViewChoice::Outcome::kChosen);
+  int quick = 0;
+  for (const double share : {0.2, 0.9, 1.5, 100.0}) {
+    options.again_per_m = share * rate(*any);
+    const auto choice = chooser.choose(world.context(), world.q, options, run_on_two);
+    REQUIRE(choice);
+    if (choice->outcome != ViewChoice::Outcome::kChosen) continue;
+    ++quick;
+    CHECK(rate(*choice) >= options.again_per_m);
+  }
+  CHECK(quick >= 2);
+  CHECK(quick < 4);
+}
+
 TEST_CASE("what was good and not chosen stands for the next choice", "[explore]") {
   SmallWorld world(room_with_wall());
   look_from_two_places(world);
