@@ -73,9 +73,9 @@ void bench_strategies(const Options& options, Report& report) {
   std::vector<std::pair<Reached, Reached>> thesis_95, omniscient_95, omniscient_99;
   for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(options.amount(1, 8, 100)); ++seed) {
     KnownTruth truth;
-    const ExploredCell::Way ours = explore(seed, Views::kOurs, workers, truth);
-    const ExploredCell::Way thesis = explore(seed, Views::kThesis, workers, truth);
-    const ExploredCell::Way omniscient = explore(seed, Views::kOmniscient, workers, truth);
+    const ExploredCell::Way ours = explore(seed, Views::kOurs, workers, truth, {}, Until::k99);
+    const ExploredCell::Way thesis = explore(seed, Views::kThesis, workers, truth, {}, Until::k95);
+    const ExploredCell::Way omniscient = explore(seed, Views::kOmniscient, workers, truth, {}, Until::k99);
     thesis_95.emplace_back(ours.to_95, thesis.to_95);
     omniscient_95.emplace_back(ours.to_95, omniscient.to_95);
     omniscient_99.emplace_back(ours.to_99, omniscient.to_99);

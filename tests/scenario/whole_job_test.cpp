@@ -128,4 +128,26 @@ TEST_CASE("recorded pictures give the same hand-eye transform again", "[scenario
   check_dataset(folder, "pictures/dataset", result["hand_eye"]);
 }
 
+TEST_CASE("a colour camera of full HD is calibrated within the budget", "[scenario]") {
+  const JobFolder folder;
+  folder.write("cell.yaml", R"(
+walls: {low_m: [-2.0, -1.9], high_m: [2.1, 2.0], height_m: 2.6}
+board: {center_m: [0.89, 0.45, 0.42], faces: [-0.89, -0.45, 0.35]}
+camera:
+  color: {width: 1920, height: 1080, fx: 1400, fy: 1400, cx: 962, cy: 541, k1: 0.03, k2: -0.05}
+solids:
+  - {name: board's post, cylinder: {radius_m: 0.015, height_m: 1.21}, position_m: [0.95, 0.49, -0.245]}
+)");
+  folder.write("cart.yaml", "map: {planes: color}\n");  // colours need room beside grey values
+  const ProgramResult run =
+      folder.run({"run", "--cell", "cell.yaml", "--config", "cart.yaml", "--only", "calibrate", "--out", "hd"});
+  INFO(run.err);
+  REQUIRE(run.exit_code == 0);
+  const Json result = folder.read_json("hd/result.json");
+  check_safe(result);
+  CHECK(result["truth"]["hand_eye_error_mm"].get<double>() < 0.5);
+  CHECK(result["truth"]["hand_eye_error_mrad"].get<double>() < 0.5);
+  CHECK_THAT(folder.read("hd/camera_info.yaml"), Catch::Matchers::Contains("image_width: 1920"));
+}
+
 }  // namespace firstlook
