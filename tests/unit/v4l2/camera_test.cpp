@@ -418,18 +418,6 @@ TEST_CASE("controls hold still while it streams, and are put back", "[v4l2][came
   CHECK(rig.kernel.controls == before);
 }
 
-TEST_CASE("frames that do not fit the memory page are refused with the numbers", "[v4l2][camera]") {
-  memory::reset_accounts();
-  V4l2CameraOptions options = small_camera();
-  options.capture.width = 1600;
-  options.capture.height = 1200;
-  test::SimulatedV4l2Kernel kernel;
-  const auto made = V4l2Camera::make(kernel, options);
-  REQUIRE_FALSE(made.has_value());
-  CHECK(made.error().fault == Fault::kOutOfMemory);
-  CHECK(made.error().detail().find("colour camera slots") != std::string_view::npos);
-}
-
 TEST_CASE("the real kernel's camera, where one is named", "[v4l2][device]") {
   const char* const device = std::getenv("FIRSTLOOK_TEST_CAMERA");
   if (device == nullptr) {
