@@ -145,6 +145,7 @@ class Bench {
   }
   [[nodiscard]] const Workbench& bench() const { return *bench_; }
   mock::MockDepthCamera& depth() { return depth_; }
+  mock::MockColorCamera& color() { return color_; }
   CartJobs& jobs() { return *jobs_; }
 
  private:
@@ -304,6 +305,28 @@ TEST_CASE("a picture that moves is no view, unless it never stands still", "[job
   CHECK(records[1].settling->still);
   CHECK(records[1].settling->looks == 2);
   CHECK(records[1].settling->scatter_px == Approx(0.05).epsilon(0.2));
+}
+
+TEST_CASE("frames that the camera no longer holds say nothing of the board: another look", "[jobs]") {
+  Bench bench;
+  const auto forget = [&bench](const DetectArguments& look, std::initializer_list<std::size_t> which) {
+    for (const std::size_t i : which) bench.color().lose(look.frames[i].frame.sequence);
+  };
+  auto look = bench.look_at_three(BoardLook::kCollect, 1);
+  forget(look, {0, 1, 2});
+  auto seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, look);
+  CHECK_FALSE(seen.found);
+  CHECK_FALSE(seen.still);
+  look = bench.look_at_three(BoardLook::kCollect, 2);
+  forget(look, {0, 2});
+  seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, look);
+  CHECK_FALSE(seen.found);
+  CHECK_FALSE(seen.still);
+  look = bench.look_at_three(BoardLook::kCollect, 3);
+  forget(look, {0});  // most are there
+  seen = bench.result_of<DetectResult>(JobKind::kDetectBoard, look);
+  CHECK(seen.found);
+  CHECK(seen.still);
 }
 
 TEST_CASE("a stored calibration of another mount is rejected, with figure and limit", "[jobs]") {
