@@ -217,8 +217,8 @@ TEST_CASE("another size, no such device, too large: said with what to do", "[ope
     CHECK_FALSE(rig.camera->report(rig.now()).remedy.empty());
   }
   SECTION("memory") {
-    options.sensor.width = 1280;
-    options.sensor.height = 1024;
+    options.sensor.width = 1920;
+    options.sensor.height = 1080;
     memory::reset_accounts();
     const auto made = OpenNiDepth::make(kernel(), options);
     REQUIRE_FALSE(made.has_value());

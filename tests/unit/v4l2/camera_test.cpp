@@ -177,7 +177,7 @@ TEST_CASE("the last 32 frames are held", "[v4l2][camera]") {
   CHECK(gone.error().fault == Fault::kFrameGone);
 }
 
-TEST_CASE("pictures up to full HD are held, 6 of them; larger ones are refused with the numbers", "[v4l2][camera]") {
+TEST_CASE("pictures up to full HD are held, and larger ones refused with the numbers", "[v4l2][camera]") {
   V4l2CameraOptions options = small_camera();
   options.capture.width = options.intrinsics.width = 1920;
   options.capture.height = options.intrinsics.height = 1080;
