@@ -3,7 +3,9 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
+#include "app/check/device_check.hpp"
 #include "app/cli/cli.hpp"
 #include "app/config/config.hpp"
 #include "app/shell/cart.hpp"
@@ -34,8 +36,9 @@ class JobSite {
 /// The real cart: robot, colour camera and depth camera as the configuration names them, the panel if it names one.
 /// Errors: kUsage for options that only a simulated cell has, kConfigBadValue for what does not go together,
 /// kDeviceMissing and others of the drivers.
+/// @param asked  takes what a panel said that is not ready
 [[nodiscard]] Result<std::unique_ptr<JobSite>> open_real_site(const RunCommand& command, Config& config,
-                                                              Narrator& narrator);
+                                                              Narrator& narrator, std::vector<CheckedDevice>& asked);
 
 /// Whether `robot.host` names a controller on the network, rather than none or one in this process.
 [[nodiscard]] bool names_network_robot(const Config& config);

@@ -216,7 +216,7 @@ bool names_real_devices(const Config& config) {
   return config.camera.device != "none" || config.depth.device != "none" || config.panel.can_interface != "none";
 }
 
-Result<RealDevices> open_real_devices(const Config& config) {
+Result<RealDevices> open_real_devices(const Config& config, std::vector<CheckedDevice>& asked) {
   RealDevices devices;
   if (is_kinect(config.camera.device) || is_kinect(config.depth.device)) {
     if (const Status opened = open_kinect(config, devices); !opened) return std::unexpected(opened.error());
@@ -234,7 +234,7 @@ Result<RealDevices> open_real_devices(const Config& config) {
         take(CartDevice::kDepthCamera, openni::OpenNiDepth::make(kernel(), *options), devices.depth, devices);
     if (!opened) return std::unexpected(opened.error());
   }
-  auto panel = open_panel(config);
+  auto panel = open_panel(config, asked);
   if (!panel) return std::unexpected(panel.error());
   if (!panel->panel) panel->panel = std::make_shared<NoPanel>();
   devices.panel = panel->panel.get();
@@ -243,14 +243,16 @@ Result<RealDevices> open_real_devices(const Config& config) {
   return devices;
 }
 
-Result<OpenedPanel> open_panel(const Config& config) {
+Result<OpenedPanel> open_panel(const Config& config, std::vector<CheckedDevice>& asked) {
   OpenedPanel opened;
   if (config.panel.can_interface == "none") return opened;
   {
-    const DeviceCheck asked = panel_check(config);
+    const DeviceCheck check = panel_check(config);
     RealClock clock;
-    const hal::DeviceReport report = watch_devices({&asked, 1}, clock).front().report;
+    const CheckedDevice answered = watch_devices({&check, 1}, clock).front();
+    const hal::DeviceReport& report = answered.report;
     if (report.state != hal::DeviceState::kReady) {
+      asked.push_back(answered);
       return failure(Fault::kDeviceMissing, "panel {}: {}. {}", report.device.view(), report.detail.view(),
                      report.remedy.view());
     }

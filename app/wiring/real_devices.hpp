@@ -33,15 +33,17 @@ struct RealDevices {
 
 /// Opens what the configuration names; it must name both cameras. Errors: those of the drivers and of a
 /// camera_info.yaml that is named, as real_device_checks.
-[[nodiscard]] Result<RealDevices> open_real_devices(const Config& config);
+/// @param asked  as open_panel
+[[nodiscard]] Result<RealDevices> open_real_devices(const Config& config, std::vector<CheckedDevice>& asked);
 
 /// The panel alone; null where the configuration names none. Asks it first, which takes a second: its Stop must work
 /// before anything moves. Error: kDeviceMissing when it does not answer, or not as the configuration says.
+/// @param asked  takes what such a panel said: nobody need ask it again
 struct OpenedPanel {
   std::shared_ptr<hal::Panel> panel;
   TellingDevices telling;
 };
-[[nodiscard]] Result<OpenedPanel> open_panel(const Config& config);
+[[nodiscard]] Result<OpenedPanel> open_panel(const Config& config, std::vector<CheckedDevice>& asked);
 
 /// A check of each device that the configuration names; one that cannot even be made says why. Errors: those of a
 /// camera_info.yaml that is named: kDataMissing, kDataMalformed, kConfigBadValue for one of another size.

@@ -88,14 +88,15 @@ bool names_network_robot(const Config& config) {
 
 bool names_real_cart(const Config& config) { return config.camera.device != "none" || config.depth.device != "none"; }
 
-Result<std::unique_ptr<JobSite>> open_real_site(const RunCommand& command, Config& config, Narrator& narrator) {
+Result<std::unique_ptr<JobSite>> open_real_site(const RunCommand& command, Config& config, Narrator& narrator,
+                                                std::vector<CheckedDevice>& asked) {
   if (const Status fits = refuse_what_does_not_fit(command, config); !fits) return std::unexpected(fits.error());
   config.cell = "none";
   if (const Status locked = lock_memory(); !locked) {
     narrator.line(fmt::format("warning   memory is not locked, so the loop may be late: {}", locked.error().detail()),
                   Priority::kWarning);
   }
-  auto devices = open_real_devices(config);
+  auto devices = open_real_devices(config, asked);
   if (!devices) return std::unexpected(devices.error());
   auto arm = NetworkArm::connect(config, narrator);
   if (!arm) return std::unexpected(arm.error());

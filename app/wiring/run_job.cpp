@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "app/cli/exit_codes.hpp"
 #include "app/machine/state_table.hpp"
@@ -16,6 +17,7 @@
 #include "app/shell/job_settings.hpp"
 #include "app/shell/narrate_result.hpp"
 #include "app/wiring/job_site.hpp"
+#include "app/wiring/real_devices.hpp"
 #include "app/wiring/run_check.hpp"
 #include "platform/linux/process.hpp"
 #include "platform/memory/allocation_guard.hpp"
@@ -97,33 +99,40 @@ std::string_view robot_of(const Config& config) {
 }
 
 /// A service that cannot be opened says so until it is started again: why, and of every device what it needs.
-void tell_what_is_missing(const Config& config, const Error& error, Narrator& narrator) {
+/// @param asked  devices that opening has asked already
+void tell_what_is_missing(const Config& config, const std::vector<CheckedDevice>& asked, const Error& error,
+                          Narrator& narrator) {
   ServiceStatus status(robot_of(config));
   if (!status.heard()) return;
-  const auto tell_why = [&] {
+  const auto tell = [&](const std::vector<CheckedDevice>& devices) {
     status.state(state_row(StateId::kBoot).name, false);
     status.text(error.detail());
     status.fault(error.fault);
-  };
-  // Asking takes some seconds, in which what a start before has left says more.
-  if (!status.told_before()) tell_why();
-  const auto devices = ask_real_devices(config, narrator);
-  tell_why();
-  if (devices) {
     FixedVector<MissingDevice, 8> missing;
-    for (const CheckedDevice& device : *devices) {
+    for (const CheckedDevice& device : devices) {
       if (device.report.state != hal::DeviceState::kReady && !missing.full())
         missing.push_back({device.role, &device.report});
     }
     status.missing({missing.data(), missing.size()});
+  };
+  // Asking takes some seconds, in which what a start before has left says more.
+  if (!status.told_before()) tell(asked);
+  std::vector<CheckedDevice> devices = asked;
+  Config others = config;
+  for (const CheckedDevice& device : asked) {
+    if (device.role == kPanelRole) others.panel.can_interface = "none";
   }
+  if (const auto answered = ask_real_devices(others, narrator))
+    devices.insert(devices.end(), answered->begin(), answered->end());
+  tell(devices);
   status.leave_file();
 }
 
 Result<std::unique_ptr<JobSite>> open_site(const RunCommand& command, Config& config, Narrator& narrator) {
   if (!names_real_cart(config)) return open_simulated_site(command, config, narrator);
-  auto site = open_real_site(command, config, narrator);
-  if (!site) tell_what_is_missing(config, site.error(), narrator);
+  std::vector<CheckedDevice> asked;
+  auto site = open_real_site(command, config, narrator, asked);
+  if (!site) tell_what_is_missing(config, asked, site.error(), narrator);
   return site;
 }
 

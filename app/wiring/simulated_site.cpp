@@ -85,7 +85,8 @@ Result<std::unique_ptr<JobSite>> open_simulated_site(const RunCommand& command, 
       std::move(*scene));
   if (!cell) return std::unexpected(cell.error());
   describe_cell((*cell)->description(), config);
-  auto panel = open_panel(config);
+  std::vector<CheckedDevice> asked;
+  auto panel = open_panel(config, asked);
   if (!panel) return std::unexpected(panel.error());
   if (robot) {
     if (const Status connected = robot->connect(config, narrator); !connected)

@@ -200,11 +200,19 @@ class Feeder {
     window_.turn.fetch_add(1, std::memory_order_acq_rel);
     std::memcpy(window_.depth_mm, depth_.data(), sizeof window_.depth_mm);
     ++window_.frame;
-    // No sensor gives the same picture twice, and firstlook stops at one that does.
-    std::uint16_t& pixel = window_.depth_mm[window_.frame % depth_.size()];
-    if (pixel != 0 && access(kDepthHangsPath, F_OK) != 0) ++pixel;
+    if (access(kDepthHangsPath, F_OK) != 0) change_one_pixel();
     window_.stamp_us = static_cast<std::uint64_t>(stamp_ns / 1000);
     window_.turn.fetch_add(1, std::memory_order_release);
+  }
+
+  /// No sensor gives the same picture twice, and firstlook stops at one that does.
+  void change_one_pixel() {
+    for (std::size_t i = 0; i < depth_.size(); ++i) {
+      std::uint16_t& pixel = window_.depth_mm[(window_.frame + i) % depth_.size()];
+      if (pixel == 0) continue;                                           // it stays without a return
+      pixel = static_cast<std::uint16_t>(pixel + 1 + window_.frame % 7);  // of several frames it may be the same pixel
+      return;
+    }
   }
 
   CameraIntrinsics color_, depth_of_;
