@@ -103,7 +103,7 @@ calibration: {intrinsics: estimate}
     roles.push_back(device["role"]);
     CHECK_FALSE(device["remedy"].get<std::string>().empty());
   }
-  CHECK(roles == std::vector<std::string>{"colour camera", "depth camera", "panel", "arm", "pendant"});
+  CHECK(roles == std::vector<std::string>{"panel", "colour camera", "depth camera", "arm", "pendant"});
   CHECK_FALSE(std::filesystem::exists(folder / "runs"));
 }
 
