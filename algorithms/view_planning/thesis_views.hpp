@@ -10,9 +10,9 @@
 namespace firstlook {
 
 /// Chapter 11 of the thesis states the first part and leaves the second open: there stand the values that are best for
-/// it, all but rounds_max tried over six cells that no comparison uses (`firstlook_bench --only thesis_tuning`: 227 s to 95 %
-/// of what can be observed, 339 s with what was guessed before). The sweep before and the checks of every path are
-/// ours. Frames on the way are not used (the thesis's sensor was off while a map was loaded), and rays meet unknown
+/// it, all but rounds_max tried over six cells that no comparison uses (`firstlook_bench --only thesis_tuning`: 227 s
+/// to 95 % of what can be observed, 339 s with what was guessed before). The sweep before and the checks of every path
+/// are ours. Frames on the way are not used (the thesis's sensor was off while a map was loaded), and rays meet unknown
 /// space within reach alone, as in the thesis's virtual wall.
 struct ThesisOptions {
   std::uint64_t seed = 1;

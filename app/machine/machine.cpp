@@ -434,7 +434,11 @@ void Machine::start_look(bool depth, int count) {
 
 bool Machine::look_again(double moved_px) {
   if (looks_ >= kLooksMax) {
-    show("the picture does not stand still: {:.2f} px from frame to frame", moved_px);
+    if (moved_px > 0) {
+      show("the picture does not stand still: {:.2f} px from frame to frame", moved_px);
+    } else {
+      show("pictures are gone before they are read: the computer is too slow for the camera");
+    }
     return false;
   }
   ++looks_;

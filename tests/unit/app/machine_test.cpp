@@ -572,6 +572,24 @@ TEST_CASE("a picture that never stands still is used in the end, and said", "[ma
         ScriptedWorld::default_settings().calibration_views_max);
 }
 
+TEST_CASE("a look whose pictures are gone says that the computer is too slow", "[machine]") {
+  ScriptedWorld w;
+  w.detect = [&](const DetectArguments& a) {
+    DetectResult r;
+    r.changed = a.purpose == BoardLook::kIdentify;
+    r.still = r.found = a.purpose != BoardLook::kCollect;
+    return r;
+  };
+  REQUIRE(w.run_until(StateId::kReady));
+  w.press(hal::OperatorAction::kPlay);
+  REQUIRE(w.run_to_end());
+  const auto says = [&w](std::string_view part) {
+    return std::ranges::any_of(w.shown, [part](const std::string& line) { return line.contains(part); });
+  };
+  CHECK(says("too slow for the camera"));
+  CHECK_FALSE(says("does not stand still"));
+}
+
 TEST_CASE("the board is not judged to have moved by a picture that moves", "[machine]") {
   ScriptedWorld w;
   w.check = {.seen = 1, .moved = 1, .still = false, .moved_px = 0.4};
