@@ -183,22 +183,31 @@ const UrSize* find_size(std::string_view name) {
   return nullptr;
 }
 
-/// Exact for the right angles that nearly all arms have.
+/// Cosine and sine. Exact for the right angles that nearly all arms have; beside them, where a factory's corrections
+/// are, by a few terms of their series, which is several times as fast and as accurate: the next term is below 1e-17.
 void cos_sin(double angle_rad, double& c, double& s) {
-  if (angle_rad == 0) {
-    c = 1, s = 0;
-  } else if (std::abs(angle_rad) == kPi / 2) {
-    c = 0, s = angle_rad > 0 ? 1 : -1;
-  } else {
+  constexpr double kBeside_rad = 0.01;
+  const double turn = std::abs(angle_rad) < kPi / 4 ? 0 : std::copysign(kPi / 2, angle_rad);
+  const double x = angle_rad - turn, x2 = x * x;
+  if (x2 > kBeside_rad * kBeside_rad) {
     c = std::cos(angle_rad), s = std::sin(angle_rad);
+    return;
+  }
+  const double cos_x = 1 - x2 / 2 * (1 - x2 / 12 * (1 - x2 / 30));
+  const double sin_x = x * (1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42)));
+  if (turn == 0) {
+    c = cos_x, s = sin_x;
+  } else {
+    c = turn > 0 ? -sin_x : sin_x, s = turn > 0 ? cos_x : -cos_x;
   }
 }
 
 /// Ry(beta) Rz(gamma), for rows that have them.
 template <typename Columns>
 void turn_further(const DhRow& row, Columns& to) {
-  const double cb = std::cos(row.beta_rad), sb = std::sin(row.beta_rad);
-  const double cg = std::cos(row.gamma_rad), sg = std::sin(row.gamma_rad);
+  double cb = 1, sb = 0, cg = 1, sg = 0;
+  cos_sin(row.beta_rad, cb, sb);
+  cos_sin(row.gamma_rad, cg, sg);
   const Eigen::Vector3d x = to.col(0) * cb - to.col(2) * sb;
   const Eigen::Vector3d y = to.col(1);
   to.col(2) = Eigen::Vector3d(to.col(2) * cb + to.col(0) * sb);

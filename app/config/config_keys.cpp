@@ -333,7 +333,8 @@ void add_depth_keys(Keys& keys, Config& c) {
                   0,
                   0,
                   {},
-                  "camera_info.yaml with its intrinsics; none: by the field of view that the device states"});
+                  "camera_info.yaml with its intrinsics and the size of its pictures, 640 x 480 pixels at most in all; "
+                  "none: that size, by the field of view that the device states"});
   keys.push_back({"depth.mount_m",
                   &c.depth.mount_m,
                   -1,

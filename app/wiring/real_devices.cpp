@@ -14,6 +14,7 @@
 #include "platform/linux/system_calls.hpp"
 #include "platform/loop/clock.hpp"
 #include "platform/loop/event.hpp"
+#include "platform/memory/budget.hpp"
 
 namespace firstlook {
 namespace {
@@ -101,6 +102,13 @@ Result<openni::OpenNiDepthOptions> depth_options(const Config::Depth& d) {
   if (d.info == "none") return options;
   const Result<CameraIntrinsics> read = read_camera_info(d.info);
   if (!read) return std::unexpected(read.error());
+  const std::size_t pixels_max = memory::budget_row(memory::Pool::kDepthFrames).bytes_each / sizeof(std::uint16_t);
+  if (static_cast<std::size_t>(read->width) * static_cast<std::size_t>(read->height) > pixels_max) {
+    return failure(Fault::kConfigBadValue,
+                   "depth.info: {} is of {} x {} pixels, memory holds depth pictures of {} pixels (640 x 480). "
+                   "Name one for a smaller mode of the camera.",
+                   d.info, read->width, read->height, pixels_max);
+  }
   options.intrinsics = *read;
   options.sensor.width = read->width;
   options.sensor.height = read->height;

@@ -1,5 +1,6 @@
 /// `firstlook check` and `firstlook bundle` as a user types them.
 #include "tests/support/job_run.hpp"
+#include "tests/support/recorded_data.hpp"
 
 namespace firstlook {
 using Catch::Matchers::Contains;
@@ -42,6 +43,17 @@ TEST_CASE("devices that are configured and not there are named with what to do",
   CHECK(folder.run({"check", "--config", "cart.yaml"}).exit_code == 3);
   folder.write("cart.yaml", "camera: {devise: /dev/video0}\n");
   CHECK_THAT(folder.run({"check", "--config", "cart.yaml"}).err, Contains("camera.device"));
+}
+
+TEST_CASE("depth pictures that memory has no room for are refused before a job", "[scenario][check]") {
+  const JobFolder folder;
+  folder.write("depth.yaml", test::camera_yaml({1280, 960, 1150, 1150, 639.5, 479.5}));
+  folder.write("cart.yaml", "depth: {device: openni, info: depth.yaml}\n");
+  const ProgramResult run = folder.run({"check", "--config", "cart.yaml"});
+  CHECK(run.exit_code == 3);
+  CHECK_THAT(run.err, Contains("depth.yaml") && Contains("1280 x 960") && Contains("640 x 480"));
+  folder.write("depth.yaml", test::camera_yaml({640, 480, 575, 575, 319.5, 239.5}));
+  CHECK(folder.run({"check", "--config", "cart.yaml"}).exit_code == 4);  // no such camera here
 }
 
 TEST_CASE("no job starts without the panel that is configured", "[scenario][check]") {

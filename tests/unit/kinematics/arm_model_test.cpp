@@ -18,14 +18,16 @@ JointVector random_joints(Random& random) {
   return q;
 }
 
-/// Independent of forward(): the four elementary motions of each row, multiplied out.
+/// Independent of forward(): the elementary motions of each row, multiplied out.
 Pose chain(const ArmModel& arm, const JointVector& q) {
   Pose pose = Pose::Identity();
   for (int j = 0; j < arm.joints; ++j) {
     const DhRow& row = arm.dh[static_cast<std::size_t>(j)];
     pose = pose * Eigen::AngleAxisd(q[j] + row.theta_offset_rad, Eigen::Vector3d::UnitZ()) *
            Eigen::Translation3d(0, 0, row.d_m) * Eigen::Translation3d(row.a_m, 0, 0) *
-           Eigen::AngleAxisd(row.alpha_rad, Eigen::Vector3d::UnitX());
+           Eigen::AngleAxisd(row.alpha_rad, Eigen::Vector3d::UnitX()) *
+           Eigen::AngleAxisd(row.beta_rad, Eigen::Vector3d::UnitY()) *
+           Eigen::AngleAxisd(row.gamma_rad, Eigen::Vector3d::UnitZ());
   }
   return pose;
 }
@@ -71,6 +73,21 @@ TEST_CASE("forward kinematics is the product of its elementary motions") {
       const JointVector q = random_joints(random);
       CHECK((forward(arm, q).flange().pose().matrix() - chain(arm, q).matrix()).cwiseAbs().maxCoeff() < 1e-14);
     }
+  }
+}
+
+TEST_CASE("forward kinematics with a factory's corrections, small and large") {
+  Random random(67);
+  const double scale_rad = GENERATE(1e-9, 1e-3, 0.0099, 0.0101, 0.5, 3.0);
+  CAPTURE(scale_rad);
+  ArmModel arm = *find_arm_model("ur5e");
+  for (DhRow& row : arm.dh) {
+    for (double* angle_rad : {&row.alpha_rad, &row.beta_rad, &row.gamma_rad})
+      *angle_rad += scale_rad * (1 - 2 * random.below(2));
+  }
+  for (int i = 0; i < 100; ++i) {
+    const JointVector q = random_joints(random);
+    CHECK((forward(arm, q).flange().pose().matrix() - chain(arm, q).matrix()).cwiseAbs().maxCoeff() < 1e-14);
   }
 }
 
