@@ -183,31 +183,29 @@ const UrSize* find_size(std::string_view name) {
   return nullptr;
 }
 
-/// Cosine and sine. Exact for the right angles that nearly all arms have; beside them, where a factory's corrections
-/// are, by a few terms of their series, which is several times as fast and as accurate: the next term is below 1e-17.
-void cos_sin(double angle_rad, double& c, double& s) {
+struct CosSin {
+  double c, s;
+};
+
+/// Exact for the right angles that nearly all arms have; beside them, where a factory's corrections are, by a few terms
+/// of their series, which is several times as fast and as accurate: the next term is below 1e-17.
+inline CosSin cos_sin(double angle_rad) {
   constexpr double kBeside_rad = 0.01;
   const double turn = std::abs(angle_rad) < kPi / 4 ? 0 : std::copysign(kPi / 2, angle_rad);
   const double x = angle_rad - turn, x2 = x * x;
-  if (x2 > kBeside_rad * kBeside_rad) {
-    c = std::cos(angle_rad), s = std::sin(angle_rad);
-    return;
-  }
+  if (x2 > kBeside_rad * kBeside_rad) [[unlikely]]
+    return {std::cos(angle_rad), std::sin(angle_rad)};
   const double cos_x = 1 - x2 / 2 * (1 - x2 / 12 * (1 - x2 / 30));
   const double sin_x = x * (1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42)));
-  if (turn == 0) {
-    c = cos_x, s = sin_x;
-  } else {
-    c = turn > 0 ? -sin_x : sin_x, s = turn > 0 ? cos_x : -cos_x;
-  }
+  if (turn == 0) return {cos_x, sin_x};
+  return turn > 0 ? CosSin{-sin_x, cos_x} : CosSin{sin_x, -cos_x};
 }
 
 /// Ry(beta) Rz(gamma), for rows that have them.
 template <typename Columns>
 void turn_further(const DhRow& row, Columns& to) {
-  double cb = 1, sb = 0, cg = 1, sg = 0;
-  cos_sin(row.beta_rad, cb, sb);
-  cos_sin(row.gamma_rad, cg, sg);
+  const auto [cb, sb] = cos_sin(row.beta_rad);
+  const auto [cg, sg] = cos_sin(row.gamma_rad);
   const Eigen::Vector3d x = to.col(0) * cb - to.col(2) * sb;
   const Eigen::Vector3d y = to.col(1);
   to.col(2) = Eigen::Vector3d(to.col(2) * cb + to.col(0) * sb);
@@ -269,9 +267,7 @@ LinkFrames forward(const ArmModel& arm, const JointVector& q_rad) {
     const double angle = q_rad[j] + row.theta_offset_rad;
     const double c = std::cos(angle);
     const double s = std::sin(angle);
-    double ca = 1;
-    double sa = 0;
-    cos_sin(row.alpha_rad, ca, sa);
+    const auto [ca, sa] = cos_sin(row.alpha_rad);
     const Eigen::Vector3d turned_y = from.col(1) * c - from.col(0) * s;
     to.col(0) = from.col(0) * c + from.col(1) * s;
     to.col(1) = turned_y * ca + from.col(2) * sa;

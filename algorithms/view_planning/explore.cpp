@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "algorithms/motion/configuration_batch.hpp"
@@ -17,6 +18,8 @@ constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each ca
 // states with less than 1 mm trap the arm).
 constexpr double kTargetMargin_m = 0.005;
 constexpr std::uint64_t kRefineStream = 4600ULL << 40;
+constexpr std::uint64_t kEyesStream = 4700ULL << 40;
+constexpr int kEyesDrawn = 4096, kEyesAtOnce = 256;
 constexpr double kRefinedMargin_m = 0.015;  // steps lead towards what hides the rest, and a look there finds more of it
 constexpr double kAside_rad = 0.12;         // standard deviation of each joint in a step of refinement
 constexpr double kBackMax = 0.4;            // of the way to where the arm is, in every other step
@@ -70,6 +73,7 @@ ViewChooser::ViewChooser(const GridGeometry& geometry, const DepthSensor& sensor
   const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max)) + kKeptMax;
   kept_.reserve(kKeptMax);
   kept_ahead_.reserve(kKeptMax);
+  eyes_m_.reserve(kEyesDrawn);
   candidates_.resize(room);
   order_.reserve(room);
   best_.reserve(room);
@@ -82,7 +86,8 @@ std::size_t ViewChooser::required_bytes(const GridGeometry& geometry, const Dept
   const auto room = static_cast<std::size_t>(std::max(candidates_max, kSources * certificate_samples_max)) + kKeptMax;
   const std::size_t worker = geometry.count() + 2 * rays * sizeof(Eigen::Vector3d);
   return GainModel::required_bytes(geometry, sensor, sampling) + static_cast<std::size_t>(workers_max) * worker +
-         room * (sizeof(Candidate) + 3 * sizeof(int)) + 2 * kKeptMax * sizeof(JointVector);
+         room * (sizeof(Candidate) + 3 * sizeof(int)) + 2 * kKeptMax * sizeof(JointVector) +
+         kEyesDrawn * sizeof(Eigen::Vector3d);
 }
 
 JointVector ViewChooser::draw_random(const Task& task, Random& random) const {
@@ -111,10 +116,27 @@ JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
   return q;
 }
 
+/// Where the sensor can be: its places in random configurations, those in known free space.
+void ViewChooser::find_eyes(const Task& task, RunParallel run_parallel) {
+  const ViewContext& c = task.context;
+  eyes_m_.resize(kEyesDrawn);
+  run_parallel(kEyesDrawn / kEyesAtOnce, [&](int part, int) {
+    Random random(task.options.seed, kEyesStream + (static_cast<std::uint64_t>(task.options.step) << 10) +
+                                         static_cast<std::uint64_t>(part));
+    for (int i = 0; i < kEyesAtOnce; ++i) {
+      const LinkFrames frames = forward(c.arm, draw_random(task, random));
+      Eigen::Vector3d& eye_m = eyes_m_[static_cast<std::size_t>(part * kEyesAtOnce + i)];
+      eye_m = (frames.flange() * c.flange_T_depth).translation();
+      if (c.space.margin_m(eye_m, c.clearance) < 0) eye_m.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+  });
+  std::erase_if(eyes_m_, [](const Eigen::Vector3d& eye_m) { return eye_m.hasNaN(); });
+}
+
 bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const {
   const ViewContext& c = task.context;
   const std::span<const std::uint32_t> frontier = gain_.frontier();
-  if (frontier.empty()) return false;
+  if (frontier.empty() || eyes_m_.empty()) return false;
   // The certificate goes through the frontier evenly; an ordinary choice picks at random.
   const auto n = static_cast<int>(frontier.size());
   const int pick =
@@ -124,13 +146,13 @@ bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointV
   const Eigen::Vector3d axis = out.norm() > 1e-9 ? Eigen::Vector3d(out.normalized()) : random.direction();
   const Eigen::Vector3d target = c.map.geometry().center_m(c.map.geometry().voxel_at(voxel));
   // From a place that the sensor has in a random configuration: of places drawn around the target few can be reached.
-  const Eigen::Vector3d eye = (forward(c.arm, draw_random(task, random)).flange() * c.flange_T_depth).translation();
+  const Eigen::Vector3d& eye = eyes_m_[static_cast<std::size_t>(random.below(static_cast<int>(eyes_m_.size())))];
   const Eigen::Vector3d to_eye = eye - target;
   const double distance_m = to_eye.norm();
   const double near_m = std::max(kStandOffMin_m, gain_.sensor().range_min_m + 0.05);
   if (distance_m < near_m || distance_m > std::max(near_m, kStandOffMax_m)) return false;
   if (to_eye.dot(axis) < std::cos(kAimCone_rad) * distance_m) return false;
-  if (c.space.margin_m(eye, c.clearance) < 0 || !is_seen_from(c.map, eye, voxel)) return false;
+  if (!is_seen_from(c.map, eye, voxel)) return false;
   if (gain_.needs_backing(voxel) && !gain_.is_backed(c.map, eye, -to_eye / distance_m)) return false;
   const auto base_T_depth =
       look_at<Depth>(target, to_eye / distance_m, distance_m, random.uniform(0, 2 * std::numbers::pi));
@@ -438,6 +460,7 @@ Result<ViewChoice> ViewChooser::search(const ViewContext& context, const JointVe
             .certificate = false,
             .samples = candidates_max_,
             .kept = static_cast<int>(kept_.size())};
+  find_eyes(task, run_parallel);
   for (const bool certificate : {false, true}) {
     task.certificate = certificate;
     if (certificate) task.samples = options.certificate_samples, task.kept = 0;

@@ -117,6 +117,7 @@ class ViewChooser {
 
   [[nodiscard]] JointVector draw_random(const Task& task, Random& random) const;
   [[nodiscard]] JointVector draw_nearby(const Task& task, Random& random) const;
+  void find_eyes(const Task& task, RunParallel run_parallel);
   [[nodiscard]] bool draw_aimed(const Task& task, int index, Random& random, JointVector& q_rad) const;
   void find_candidate(const Task& task, int index, Candidate& out) const;
   void estimate(const Task& task, Candidate& candidate, GainWorker& worker) const;
@@ -148,6 +149,7 @@ class ViewChooser {
   std::vector<int> unreached_;           ///< candidates that the planner failed on
   std::vector<JointVector> kept_;        ///< good candidates of the latest choice, which stand for the next one, too
   std::vector<JointVector> kept_ahead_;  ///< those of a choice with `after_look`, until adopt()
+  std::vector<Eigen::Vector3d> eyes_m_;  ///< from which aimed candidates look
   int candidates_max_;
   Planner planner_;
   FixedVector<JointVector, 32> visited_;  ///< the latest looks

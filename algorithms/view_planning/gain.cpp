@@ -62,14 +62,25 @@ bool may_block(const Capsule& capsule, const Eigen::Vector3d& eye, const Eigen::
   return angle - std::asin(radius_m / distance_m) <= half_cone_rad;
 }
 
-/// Whether a capsule's bounding sphere (a little more) comes near the line of a ray: cheaper than to ask for the
-/// segment.
-bool may_block(const Capsule& capsule, const Eigen::Vector3d& eye, const Eigen::Vector3d& to) {
+/// A capsule in the frame of the sensor, and the sphere around it (a little more), which is cheaper to ask.
+struct Obstacle {
+  Capsule capsule;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double beyond_m2 = 0;  ///< of the squared distance to the center: what the sphere leaves of it
+
+  /// Whether the capsule meets the ray from the sensor to a point `end` that is `length_m2`, squared, away.
+  [[nodiscard]] bool blocks(const Eigen::Vector3d& end, double length_m2) const {
+    const double along = center.dot(end);
+    if (along * along < beyond_m2 * length_m2) return false;
+    return segment_distance_m(Eigen::Vector3d::Zero(), end, capsule.a, capsule.b) <= capsule.radius_m;
+  }
+};
+
+Obstacle obstacle_of(const Capsule& capsule) {
   constexpr double kRounding_m = 1e-6;
-  const double reach_m = (capsule.b - capsule.a).norm() / 2 + capsule.radius_m + kRounding_m;
-  const Eigen::Vector3d ray = to - eye;
-  const Eigen::Vector3d to_center = (capsule.a + capsule.b) / 2 - eye;
-  return to_center.cross(ray).squaredNorm() <= reach_m * reach_m * ray.squaredNorm();
+  const Eigen::Vector3d center = (capsule.a + capsule.b) / 2;
+  const double radius_m = (capsule.b - capsule.a).norm() / 2 + capsule.radius_m + kRounding_m;
+  return {.capsule = capsule, .center = center, .beyond_m2 = center.squaredNorm() - radius_m * radius_m};
 }
 
 }  // namespace
@@ -176,17 +187,20 @@ const GainRays& GainModel::free_rays(const ViewContext& context, const LinkFrame
                                      const Transform<Base, Depth>& base_T_depth, GainWorker& worker) const {
   const Eigen::Vector3d eye = base_T_depth.translation();
   const Eigen::Vector3d axis = base_T_depth.rotation().col(2);
-  Capsules blocking;
-  for (const Capsule& capsule : place(context.body.capsules, frames)) {
-    if (may_block(capsule, eye, axis, half_cone_rad_)) blocking.push_back(capsule);
+  const Transform<Depth, Base> depth_T_base = base_T_depth.inverse();
+  FixedVector<Obstacle, kCapsulesMax> obstacles;
+  for (Capsule capsule : place(context.body.capsules, frames)) {
+    if (!may_block(capsule, eye, axis, half_cone_rad_)) continue;
+    capsule.a = depth_T_base * capsule.a;
+    capsule.b = depth_T_base * capsule.b;
+    obstacles.push_back(obstacle_of(capsule));
   }
-  if (blocking.empty()) return rays_;
+  if (obstacles.empty()) return rays_;
   worker.rays.ends_m.clear();
   for (const Eigen::Vector3d& end : rays_.ends_m) {
-    const Eigen::Vector3d to = base_T_depth * end;
-    const bool blocked = std::any_of(blocking.begin(), blocking.end(), [&](const Capsule& c) {
-      return may_block(c, eye, to) && segment_distance_m(eye, to, c.a, c.b) <= c.radius_m;
-    });
+    const double length_m2 = end.squaredNorm();
+    const bool blocked = std::any_of(obstacles.begin(), obstacles.end(),
+                                     [&](const Obstacle& obstacle) { return obstacle.blocks(end, length_m2); });
     if (!blocked) worker.rays.ends_m.push_back(end);
   }
   return worker.rays;
