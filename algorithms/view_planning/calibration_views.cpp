@@ -143,6 +143,8 @@ void draw_aimed(Search& s) {
     const double roll_rad = s.random.uniform(0, 2 * std::numbers::pi);
     const Eigen::Vector3d target = center + 0.03 * s.random.normal3();  // the board need not be in the middle
     const auto base_T_camera = look_at<Camera>(target, direction, distance_m, roll_rad);
+    // The camera stands in known free space: cheaper to ask than how the arm gets it there.
+    if (in.space.margin_m(base_T_camera.translation(), in.clearance) < 0) continue;
     for (const JointVector& q : postures_looking(in.arm, base_T_camera, camera_T_flange, distance_m, s.current)) {
       consider(s, q);
     }
