@@ -1,4 +1,6 @@
 /// Kinds of sensor and options of the map, through the whole program.
+#include <sstream>
+
 #include "tests/support/job_run.hpp"
 
 namespace firstlook {
@@ -106,12 +108,27 @@ TEST_CASE("colours, labels and sensors of voxels", "[scenario]") {
 TEST_CASE("the plane fit and a ground that clears only", "[scenario]") {
   // The empty cell's floor is 0.85 m below the base.
   const std::string extents = "low_m: [-1.5, -1.5, -1.0]";
-  const Json plain = run_with("map: {" + extents + "}\n");
-  const Json fitted =
-      run_with("depth: {plane_fit_px: 7}\nmap: {" + extents + ", ground_height_m: -0.85, ground_tolerance_m: 0.06}\n");
-  CHECK(plain["mapping"]["frames"]["pixels_fitted"] == 0);
-  CHECK(fitted["mapping"]["frames"]["pixels_fitted"].get<int>() > 100000);
-  CHECK(fitted["mapping"]["voxels"]["occupied"].get<int>() < plain["mapping"]["voxels"]["occupied"].get<int>() / 2);
+  const JobFolder folder;
+  const auto occupied_floor_voxels = [&](const std::string& name, const std::string& config) {
+    folder.write(name + ".yaml", "explore: {views_max: 16}\n" + config);
+    const ProgramResult run = folder.run_job(name, {"--config", name + ".yaml"});
+    INFO(run.err);
+    REQUIRE(run.exit_code == 0);
+    check_safe(folder.read_json(name + "/result.json"));
+    REQUIRE(folder.run({"export", name, "--to", "csv"}).exit_code == 0);
+    std::istringstream rows(folder.read(name + "/export/csv/voxels.csv"));
+    int count = 0;
+    for (std::string row; std::getline(rows, row);) {
+      const bool floor = row.find(",-0.875,") != std::string::npos || row.find(",-0.825,") != std::string::npos;
+      count += floor && row.find(",occupied,") != std::string::npos ? 1 : 0;
+    }
+    return count;
+  };
+  CHECK(occupied_floor_voxels("plain", "map: {" + extents + "}\n") > 1000);
+  CHECK(occupied_floor_voxels("fitted", "depth: {plane_fit_px: 7}\nmap: {" + extents +
+                                            ", ground_height_m: -0.85, ground_tolerance_m: 0.06}\n") < 20);
+  CHECK(folder.read_json("plain/result.json")["mapping"]["frames"]["pixels_fitted"] == 0);
+  CHECK(folder.read_json("fitted/result.json")["mapping"]["frames"]["pixels_fitted"].get<int>() > 100000);
 }
 
 TEST_CASE("an arm that stands below the ground's top does not move", "[scenario]") {
