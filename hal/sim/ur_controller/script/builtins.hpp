@@ -71,6 +71,7 @@ struct Builtin {
 [[nodiscard]] std::span<const Builtin> robot_builtins();
 [[nodiscard]] std::span<const Builtin> io_builtins();
 [[nodiscard]] std::span<const Builtin> socket_builtins();
+[[nodiscard]] std::span<const Builtin> interpreter_builtins();
 
 struct Parameter {
   std::string name;
