@@ -62,6 +62,11 @@ class Controller {
   void play();  ///< starts, or resumes what was paused
   void pause();
   void stop();  ///< the arm brakes on its path
+  /// A popup of the program is on the pendant: the program is paused, and pauses again after each Play, until it is
+  /// closed or the program stopped.
+  void hold_by_popup();
+  void close_popup();  ///< as by its "Continue": the program goes on
+  [[nodiscard]] bool held_by_popup() const { return held_by_popup_; }
   /// The program may take its cycle.
   [[nodiscard]] bool playing() const { return state_.runtime == RuntimeState::kPlaying; }
 
@@ -116,6 +121,7 @@ class Controller {
   std::uint64_t protective_since_ = 0;
   SafetyMode emergency_ = SafetyMode::kNormal;  ///< the button that is pressed
   bool resume_after_safeguard_ = false;
+  bool held_by_popup_ = false;
   double encoder_sigma_rad_ = 0;
   std::uint64_t encoder_seed_ = 0;
   bool arm_reported_ = false;  ///< poses are those of the joints

@@ -17,6 +17,7 @@ struct ControllerEvent {
   std::int32_t code = 0;      ///< of a key, a label or an error; the line of a runtime exception
   std::int32_t argument = 0;  ///< of an error; the column of a runtime exception; the safety mode
   bool warning = false, error = false;
+  bool blocking = false;  ///< a popup that the program waits for
   std::string title = {}, text = {};
 };
 

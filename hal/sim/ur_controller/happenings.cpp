@@ -20,7 +20,8 @@ constexpr double kNone = 0;
 
 // Buttons of the pendant, safety inputs, faults, network.
 constexpr Row kRows[] = {
-    {"play", false, kNone, kNone, "Play: goes on, or begins; loads external_control.urp where nothing is loaded",
+    {"play", false, kNone, kNone,
+     "Play: closes a popup, goes on, or begins; loads external_control.urp where nothing is loaded",
      [](SimulatedUr& r, double) { press_play(r); }},
     {"pause", false, kNone, kNone, "Pause", [](SimulatedUr& r, double) { static_cast<void>(r.programs().pause()); }},
     {"stop", false, kNone, kNone, "Stop", [](SimulatedUr& r, double) { static_cast<void>(r.programs().stop()); }},
@@ -152,6 +153,7 @@ void press_play(SimulatedUr& robot) {
   constexpr std::string_view kProgram = "external_control.urp";
   Programs& programs = robot.programs();
   const bool goes_on = robot.controller().state().runtime == RuntimeState::kPaused;
+  robot.controller().close_popup();  // who presses Play has read it
   if (!goes_on && programs.loaded_path().empty() && !programs.load(kProgram)) return;
   static_cast<void>(programs.play());
 }

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint8_t kRobotState = 16;
 constexpr std::uint8_t kRobotMessage = 20;
+constexpr std::uint32_t kNothingToAsk = 8;     // of the types of values that can be requested
 constexpr std::int8_t kSourceController = -3;  // 253 unsigned: what real controllers put there
 
 /// Opens a packet with its length and type; the length is filled in at the end of its life.
@@ -188,10 +189,10 @@ void tool_mode_info(WireWriter& wire) {
 
 void popup_message(const ControllerEvent& event, WireWriter& wire) {
   wire.u32(0);  // request id
-  wire.u8(0);
+  wire.u32(kNothingToAsk);
   wire.flag(event.warning);
   wire.flag(event.error);
-  wire.flag(false);
+  wire.flag(event.blocking);
   wire.u8(static_cast<std::uint8_t>(event.title.size()));
   wire.text(event.title);
   wire.text(event.text);
