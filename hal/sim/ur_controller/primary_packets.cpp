@@ -10,7 +10,6 @@ namespace {
 
 constexpr std::uint8_t kRobotState = 16;
 constexpr std::uint8_t kRobotMessage = 20;
-constexpr std::uint32_t kNothingToAsk = 8;     // of the types of values that can be requested
 constexpr std::int8_t kSourceController = -3;  // 253 unsigned: what real controllers put there
 
 /// Opens a packet with its length and type; the length is filled in at the end of its life.
@@ -189,7 +188,7 @@ void tool_mode_info(WireWriter& wire) {
 
 void popup_message(const ControllerEvent& event, WireWriter& wire) {
   wire.u32(0);  // request id
-  wire.u32(kNothingToAsk);
+  wire.u32(static_cast<std::uint32_t>(RequestedType::kNone));
   wire.flag(event.warning);
   wire.flag(event.error);
   wire.flag(event.blocking);
@@ -288,6 +287,12 @@ std::string event_message(const ControllerEvent& event) {
         wire.i32(event.argument);
         wire.u8(static_cast<std::uint8_t>(event.title.size()));
         wire.text(event.title);
+        wire.text(event.text);
+        break;
+      case Kind::kRequest:
+        wire.u8(9);
+        wire.i32(event.code);
+        wire.i32(event.argument);
         wire.text(event.text);
         break;
       case Kind::kRuntimeException:

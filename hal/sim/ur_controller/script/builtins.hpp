@@ -72,6 +72,7 @@ struct Builtin {
 [[nodiscard]] std::span<const Builtin> io_builtins();
 [[nodiscard]] std::span<const Builtin> socket_builtins();
 [[nodiscard]] std::span<const Builtin> interpreter_builtins();
+[[nodiscard]] std::span<const Builtin> pendant_builtins();
 
 struct Parameter {
   std::string name;

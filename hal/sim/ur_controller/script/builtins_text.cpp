@@ -11,25 +11,6 @@ using Kind = ControllerEvent::Kind;
 
 void textmsg(Call& c) { c.controller().tell({.kind = Kind::kText, .text = text_of(c.value(0)) + text_of(c.value(1))}); }
 
-/// A blocking one suspends the program, as the script manual has it, not its thread alone.
-void popup(Call& c) {
-  const bool warning = c.flag(2), error = c.flag(3), blocking = c.flag(4) && !c.machine().code().secondary;
-  if (!c.ok()) return;
-  if (!c.state().first) {
-    if (!c.controller().held_by_popup()) return;
-  } else {
-    c.controller().tell({.kind = Kind::kPopup,
-                         .warning = warning,
-                         .error = error,
-                         .blocking = blocking,
-                         .title = text_of(c.value(1)).substr(0, 255),
-                         .text = text_of(c.value(0))});
-    if (!blocking) return;
-  }
-  c.controller().hold_by_popup();
-  c.wait();
-}
-
 void sleep(Call& c) { static_cast<void>(c.waited(std::max(0.0, c.number(0)))); }
 
 void sync(Call& c) {
@@ -91,7 +72,6 @@ void tell_label(Call& c) {
 constexpr Builtin kTable[] = {
     {"$", "id,text", tell_label},
     {"halt", "", halt_program},
-    {"popup", "s,title=\"Popup\",warning=False,error=False,blocking=False", popup},
     {"powerdown", "", powerdown},
     {"protective_stop", "", protective_stop},
     {"sleep", "t", sleep},

@@ -88,6 +88,64 @@ TEST_CASE("who presses Play at the pendant closes the popup first", "[ur]") {
   CHECK(robot.texts == std::vector<std::string>{"True"});
 }
 
+TEST_CASE("a program asks the operator for values and waits for them", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(
+      "def prog():\n  a = request_boolean_from_primary_client(\"Go?\")\n  textmsg(a)\n"
+      "  b = request_integer_from_primary_client(\"How many?\")\n  textmsg(b + 1)\n"
+      "  c = request_float_from_primary_client(\"How far?\")\n  textmsg(c * 2)\n"
+      "  d = request_string_from_primary_client(\"Who?\")\n  textmsg(d)\nend\n");
+  CHECK(robot.texts.empty());
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
+  // What is not of the type asked for is not taken.
+  for (const char* entered : {"yes", "True", "2.5", "4", "far", "nan", "2.5", "a=b c"}) {
+    happen(*read_happening(std::string("answer=") + entered), robot.robot);
+    robot.listen(0.02);
+  }
+  CHECK(robot.texts == std::vector<std::string>{"True", "5", "5", "a=b c"});
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.state().runtime == RuntimeState::kStopped);
+}
+
+TEST_CASE("dialogs of several threads are filled in one after the other", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send(
+      "def prog():\n  thread other():\n    textmsg(\"other \", request_integer_from_primary_client(\"other\"))\n  end\n"
+      "  t = run other()\n  textmsg(\"main \", request_integer_from_primary_client(\"main\"))\n  join t\nend\n",
+      0.1);
+  happen(*read_happening("answer=1"), robot.robot);
+  happen(*read_happening("answer=2"), robot.robot);
+  robot.listen(0.1);
+  CHECK(robot.texts == std::vector<std::string>{"main 1", "other 2"});
+}
+
+TEST_CASE("a dialog ends with its program", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("textmsg(request_integer_from_primary_client(\"How many?\"))\n", 0.1);
+  CHECK(robot.dashboard("stop") == "Stopped");
+  robot.send("textmsg(request_string_from_primary_client(\"Who?\"))\n", 0.1);
+  happen(*read_happening("answer=somebody"), robot.robot);
+  robot.listen(0.1);
+  CHECK(robot.texts == std::vector<std::string>{"somebody"});
+  robot.send("request_string_from_primary_client(\"\")\n", 0.1);
+  CHECK(robot.exceptions.size() == 1);
+}
+
+TEST_CASE("requests are told on the primary interface with the fields of UR's tables", "[ur]") {
+  UrRobot robot("ur5e");
+  Session& primary = robot.robot.open(Port::kPrimary);
+  primary.receive("request_float_from_primary_client(\"How far?\")\n");
+  robot.run(0.1);
+  auto requests = messages(primary, 9);
+  REQUIRE(requests.size() == 1);
+  CHECK(requests[0] == big_endian(1, 4) + big_endian(2, 4) + "How far?");
+  primary.receive("request_boolean_from_primary_client(\"Go?\")\n");
+  robot.run(0.1);
+  requests = messages(primary, 9);
+  REQUIRE(requests.size() == 1);
+  CHECK(requests[0] == big_endian(2, 4) + big_endian(0, 4) + "Go?");
+}
+
 TEST_CASE("popups are told on the primary interface with the fields of UR's tables", "[ur]") {
   UrRobot robot("ur5e");
   Session& primary = robot.robot.open(Port::kPrimary);
