@@ -534,13 +534,27 @@ class Compiler {
   }
   void element() {
     primary();
-    while (!error_ && now().is("[")) {
+    while (!error_ && (now().is("[") || now().is("."))) {
       const Token where = now();
+      if (where.is(".")) {
+        method();
+        continue;
+      }
       advance();
       expression();
       expect("]");
       emit_at(where, Op::kIndex);
     }
+  }
+
+  /// handle.method(arguments), which are by position alone.
+  void method() {
+    advance();
+    const Token name = now();
+    constant(expect_name());
+    expect("(");
+    const int count = elements(")");
+    emit_at(name, Op::kCallBuiltin, find_builtin("."), count + 2);
   }
 
   void primary() {
@@ -581,18 +595,18 @@ class Compiler {
   }
 
   /// Expressions up to the closing bracket; how many.
-  int elements() {
+  int elements(std::string_view closing) {
     int count = 0;
-    while (!error_ && !now().is("]")) {
+    while (!error_ && !now().is(closing)) {
       expression();
       ++count;
       if (!accept(",")) break;
     }
-    expect("]");
+    expect(closing);
     return count;
   }
 
-  void list() { emit(Op::kMakeList, elements()); }
+  void list() { emit(Op::kMakeList, elements("]")); }
 
   void named(const Token& token) {
     if (token.is("True") || token.is("False")) {
@@ -617,7 +631,7 @@ class Compiler {
     advance();
     advance();
     const int begin = here();
-    const int count = elements();
+    const int count = elements("]");
     if (error_) return;
     if (count == 6) {
       emit_at(token, Op::kMakePose);
