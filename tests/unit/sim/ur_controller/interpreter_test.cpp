@@ -182,7 +182,9 @@ TEST_CASE("skipbuffer forgets what has not begun", "[ur][interpreter]") {
   CHECK(robot.id("stateunexecuted") == 2);
   CHECK(robot.ask("skipbuffer") == "ack: 0: skipbuffer");
   CHECK(robot.id("stateunexecuted") == 0);
-  CHECK(robot.id("textmsg(\"after\")", 0.5) == 4);  // at once: the clearing is skipped, too
+  CHECK(robot.id("textmsg(\"after\")") == 4);  // at once: the clearing is skipped, too
+  CHECK(robot.texts.empty());
+  robot.listen(0.5);
   CHECK(robot.texts == std::vector<std::string>{"after"});
   CHECK(robot.id("statelastcleared") == 0);
 }
@@ -274,7 +276,11 @@ TEST_CASE("abort brakes a movej or movel, and its statement is over when the arm
   CHECK(robot.state().q_rad[0] < from[0] + 1.5);
   CHECK(robot.state().runtime == RuntimeState::kPlaying);
   // Nothing else is aborted.
-  CHECK(robot.id("speedj([0.2, 0, 0, 0, 0, 0], 1, 2)", 1) == 3);
+  CHECK(robot.id("movep(pose_add(get_actual_tcp_pose(), p[0, 0, 0.2, 0, 0, 0]), a=1, v=0.05)", 1) == 3);
+  CHECK(robot.ask("abort", 0.5) == "ack: 0: abort");
+  CHECK(robot.state().tcp_speed[2] == Approx(0.05).margin(1e-3));
+  robot.listen(4);
+  CHECK(robot.id("speedj([0.2, 0, 0, 0, 0, 0], 1, 2)", 1) == 4);
   CHECK(robot.ask("abort", 0.5) == "ack: 0: abort");
   CHECK(robot.state().qd_rad_s[0] == Approx(0.2));
 }

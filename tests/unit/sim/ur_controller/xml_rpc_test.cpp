@@ -76,7 +76,7 @@ TEST_CASE("a program calls a function of another computer and has its answer", "
       "def prog():\n  global camera = rpc_factory(\"xmlrpc\", \"http://10.0.0.9:8080/RPC2\")\n"
       "  pose = camera.find(\"a<b\", 3, 2.5, True, [1, 2.0], p[1, 2, 3, 0, 0, 0.5])\n  textmsg(pose)\n"
       "  if not camera.more():\n    textmsg(\"no more\")\n  end\n  camera.closeXMLRPCClientConnection()\n"
-      "  textmsg(\"over\")\nend\n",
+      "  textmsg(\"over\")\n  sleep(1)\nend\n",
       0.1);
   CHECK(robot.server.host == "10.0.0.9");
   CHECK(robot.server.port == 8080);
@@ -113,6 +113,7 @@ TEST_CASE("a program calls a function of another computer and has its answer", "
   CHECK(robot.texts.back() == "over");
   CHECK(robot.exceptions.empty());
   CHECK_FALSE(robot.server.open_now);
+  CHECK(robot.state().runtime == RuntimeState::kPlaying);
 }
 
 TEST_CASE("a server that is not there, or does not know the function, ends the program", "[ur][script]") {
