@@ -215,7 +215,8 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
   CLI::App* campaign_app = add_campaign(app, campaign);
   UrSimCommand ur_sim;
   CLI::App* ur_sim_app = app.add_subcommand(
-      "ur-sim", "a simulated Universal Robots controller on TCP: RTDE, dashboard, primary, secondary, realtime");
+      "ur-sim",
+      "a simulated Universal Robots controller on TCP: RTDE, dashboard, primary, secondary, realtime, interpreter");
   ur_sim_app
       ->add_option("--model", ur_sim.model, "ur3, ur5, ur10 (CB3, 3.15, 125 Hz); ur3e, ur5e, ur10e (5.12, 500 Hz)")
       ->check(CLI::IsMember({"ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e"}))
@@ -224,7 +225,7 @@ ParsedCommandLine parse_command_line(int argc, const char* const* argv) {
       ->capture_default_str();
   ur_sim_app
       ->add_option("--port-offset", ur_sim.port_offset,
-                   "added to the ports 29999, 30001 to 30004, 30011 to 30013, 30098")
+                   "added to the ports 29999, 30001 to 30004, 30011 to 30013, 30020 (e-Series), 30098")
       ->check(CLI::Range(-29000, 35500))
       ->capture_default_str();
   ur_sim_app

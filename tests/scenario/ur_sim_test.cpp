@@ -63,6 +63,21 @@ TEST_CASE("a script dials back to the computer that sent it", "[scenario]") {
   close(listener);
 }
 
+TEST_CASE("an e-Series takes statements on its interpreter port, a CB3 has none", "[scenario]") {
+  UrSim robot({"--model", "ur5e", "--running"});
+  Connection primary(robot, 30001), interpreter(robot, 30020);
+  CHECK(interpreter.ask("x = 1") == "discard: Program is in an invalid state: x = 1");
+  primary.send("interpreter_mode()\n");
+  primary.wait_for("PROGRAM_XXX_STARTED");
+  CHECK(interpreter.ask("textmsg(\"line by line\")") == "ack: 1: textmsg(\"line by line\")");
+  primary.wait_for("line by line");
+  CHECK(interpreter.ask("statelastexecuted") == "state: 1: statelastexecuted");
+  CHECK(interpreter.ask("end_interpreter()") == "ack: 2: end_interpreter()");
+  primary.wait_for("PROGRAM_XXX_STOPPED");
+  const UrSim cb3({"--model", "ur5"});
+  CHECK_THAT(cb3.said, !Contains("interpreter"));
+}
+
 TEST_CASE("a client that does not read is dropped, the others go on", "[scenario]") {
   UrSim robot({"--model", "ur5e"});
   Connection dashboard(robot, 29999);

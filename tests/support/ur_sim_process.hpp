@@ -42,7 +42,7 @@ inline int bind_to(int port) {
 inline int free_offset() {
   for (int offset = 1000 + getpid() % 500; offset < 30'000; offset += 37) {
     bool free = true;
-    for (const int port : {29999, 30001, 30002, 30003, 30004, 30011, 30012, 30013, 30098, 30099}) {
+    for (const int port : {29999, 30001, 30002, 30003, 30004, 30011, 30012, 30013, 30020, 30098, 30099}) {
       const int descriptor = bind_to(port + offset);
       free = free && descriptor >= 0;
       if (descriptor >= 0) close(descriptor);

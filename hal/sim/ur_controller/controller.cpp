@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hal/sim/random_streams.hpp"
 #include "platform/core/random.hpp"
@@ -189,8 +190,28 @@ void Controller::pause() {
   state_.runtime = RuntimeState::kPausing;
 }
 
+void Controller::hold_by_popup() {
+  held_by_popup_ = true;
+  pause();
+}
+
+void Controller::close_popup() {
+  if (std::exchange(held_by_popup_, false)) play();
+}
+
+PendantRequests::Id Controller::ask_operator(RequestedType type, const std::string& message) {
+  const PendantRequests::Id id = requests_.ask(type);
+  tell({.kind = ControllerEvent::Kind::kRequest,
+        .code = static_cast<std::int32_t>(id),
+        .argument = static_cast<std::int32_t>(type),
+        .text = message});
+  return id;
+}
+
 void Controller::stop() {
   resume_after_safeguard_ = false;
+  held_by_popup_ = false;
+  requests_.close_all();
   set_teach_mode(false);
   if (state_.runtime == RuntimeState::kStopped) return;
   state_.runtime = RuntimeState::kStopping;

@@ -8,6 +8,7 @@
 #include "hal/sim/ur_controller/controller_events.hpp"
 #include "hal/sim/ur_controller/controller_identity.hpp"
 #include "hal/sim/ur_controller/controller_state.hpp"
+#include "hal/sim/ur_controller/pendant_requests.hpp"
 #include "hal/sim/ur_controller/rtde_watchdogs.hpp"
 
 namespace firstlook::sim::ur {
@@ -62,6 +63,14 @@ class Controller {
   void play();  ///< starts, or resumes what was paused
   void pause();
   void stop();  ///< the arm brakes on its path
+  /// A popup of the program is on the pendant: the program is paused, and pauses again after each Play, until it is
+  /// closed or the program stopped.
+  void hold_by_popup();
+  void close_popup();  ///< as by its "Continue": the program goes on
+  [[nodiscard]] bool held_by_popup() const { return held_by_popup_; }
+  /// Opens a dialog in which the operator is asked for a value; it closes with the program.
+  [[nodiscard]] PendantRequests::Id ask_operator(RequestedType type, const std::string& message);
+  [[nodiscard]] PendantRequests& requests() { return requests_; }
   /// The program may take its cycle.
   [[nodiscard]] bool playing() const { return state_.runtime == RuntimeState::kPlaying; }
 
@@ -109,6 +118,7 @@ class Controller {
   ControllerState state_;
   EventLog events_;
   RtdeWatchdogs watchdogs_;
+  PendantRequests requests_;
   double clock_s_;  ///< that its clock showed in cycle `clock_from_`
   std::uint64_t clock_from_ = 0;
   std::uint64_t mode_until_ = 0;  ///< the cycle in which kPowerOn, or the release of brakes, ends; 0: nothing under way
@@ -116,6 +126,7 @@ class Controller {
   std::uint64_t protective_since_ = 0;
   SafetyMode emergency_ = SafetyMode::kNormal;  ///< the button that is pressed
   bool resume_after_safeguard_ = false;
+  bool held_by_popup_ = false;
   double encoder_sigma_rad_ = 0;
   std::uint64_t encoder_seed_ = 0;
   bool arm_reported_ = false;  ///< poses are those of the joints

@@ -10,13 +10,14 @@ namespace firstlook::sim::ur {
 
 /// One message of the primary interface, before it is packed.
 struct ControllerEvent {
-  enum class Kind : std::uint8_t { kText, kLabel, kKey, kPopup, kSafetyMode, kErrorCode, kRuntimeException };
+  enum class Kind : std::uint8_t { kText, kLabel, kKey, kPopup, kSafetyMode, kErrorCode, kRequest, kRuntimeException };
 
   Kind kind = Kind::kText;
   double timestamp_s = 0;
-  std::int32_t code = 0;      ///< of a key, a label or an error; the line of a runtime exception
-  std::int32_t argument = 0;  ///< of an error; the column of a runtime exception; the safety mode
+  std::int32_t code = 0;      ///< of a key, a label or an error; the line of a runtime exception; the id of a request
+  std::int32_t argument = 0;  ///< of an error; the column of a runtime exception; the safety mode; the type requested
   bool warning = false, error = false;
+  bool blocking = false;  ///< a popup that the program waits for
   std::string title = {}, text = {};
 };
 

@@ -109,6 +109,7 @@ std::string popup(DashboardSession& s, Argument text) {
 
 std::string close_popup(DashboardSession& s, Argument) {
   s.dashboard().popup.clear();
+  s.controller().close_popup();
   return "closing popup";
 }
 

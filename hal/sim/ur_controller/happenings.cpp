@@ -14,16 +14,20 @@ struct Row {
   double low, high;  ///< of the value
   std::string_view meaning;
   Happening::Do act;
+  Happening::Enter enter = nullptr;  ///< takes a text
 };
 
 constexpr double kNone = 0;
 
 // Buttons of the pendant, safety inputs, faults, network.
 constexpr Row kRows[] = {
-    {"play", false, kNone, kNone, "Play: goes on, or begins; loads external_control.urp where nothing is loaded",
+    {"play", false, kNone, kNone,
+     "Play: closes a popup, goes on, or begins; loads external_control.urp where nothing is loaded",
      [](SimulatedUr& r, double) { press_play(r); }},
     {"pause", false, kNone, kNone, "Pause", [](SimulatedUr& r, double) { static_cast<void>(r.programs().pause()); }},
     {"stop", false, kNone, kNone, "Stop", [](SimulatedUr& r, double) { static_cast<void>(r.programs().stop()); }},
+    {"answer", false, kNone, kNone, "somebody fills in the dialog in which a program asks: True, 5, 2.5 or a text",
+     nullptr, [](SimulatedUr& r, std::string_view text) { r.controller().requests().enter(text); }},
     {"slider", true, 0, 1, "the speed slider is set, 0 to 1",
      [](SimulatedUr& r, double fraction) { r.controller().set_speed_slider(fraction); }},
     {"emergency-stop", false, kNone, kNone, "the button on the pendant: the power is off",
@@ -104,7 +108,12 @@ Result<Happening> read_happening(std::string_view words) {
   const std::string_view word = words.substr(0, equals);
   for (const Row& row : kRows) {
     if (row.word != word) continue;
-    Happening happening{row.act, 0};
+    Happening happening{row.act, 0, row.enter};
+    if (row.enter != nullptr) {
+      if (equals == std::string_view::npos) return failure(Fault::kUsage, "'{}': {} takes a text", words, row.word);
+      happening.text = words.substr(equals + 1);
+      return happening;
+    }
     if (!row.takes_value && equals == std::string_view::npos) return happening;
     const bool right = row.takes_value && equals != std::string_view::npos &&
                        read_number(words.substr(equals + 1), happening.value) && happening.value >= row.low &&
@@ -119,12 +128,14 @@ Result<Happening> read_happening(std::string_view words) {
 
 void happen(const Happening& happening, SimulatedUr& robot) {
   if (happening.act != nullptr) happening.act(robot, happening.value);
+  if (happening.enter != nullptr) happening.enter(robot, happening.text);
 }
 
 std::string happenings_in_words() {
   std::string text;
   for (const Row& row : kRows) {
-    text += fmt::format("  {:24} {}\n", fmt::format("{}{}", row.word, row.takes_value ? "=NUMBER" : ""), row.meaning);
+    const std::string_view value = row.takes_value ? "=NUMBER" : row.enter != nullptr ? "=TEXT" : "";
+    text += fmt::format("  {:24} {}\n", fmt::format("{}{}", row.word, value), row.meaning);
   }
   return text;
 }
@@ -143,7 +154,7 @@ Result<TimedHappening> read_timed_happening(std::string_view words) {
 Timetable timetable_of(const ControllerScript& script) {
   Timetable table;
   for (const sim::ControllerEvent& event : script) {
-    table.push_back({event.stamp, {row_of(word_of(event.action)).act, 0}});
+    table.push_back({event.stamp, {.act = row_of(word_of(event.action)).act}});
   }
   return table;
 }
@@ -152,6 +163,7 @@ void press_play(SimulatedUr& robot) {
   constexpr std::string_view kProgram = "external_control.urp";
   Programs& programs = robot.programs();
   const bool goes_on = robot.controller().state().runtime == RuntimeState::kPaused;
+  robot.controller().close_popup();  // who presses Play has read it
   if (!goes_on && programs.loaded_path().empty() && !programs.load(kProgram)) return;
   static_cast<void>(programs.play());
 }

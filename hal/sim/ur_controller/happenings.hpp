@@ -16,8 +16,11 @@ namespace firstlook::sim::ur {
 /// One of the things that happen; read from its words.
 struct Happening {
   using Do = void (*)(SimulatedUr&, double);
+  using Enter = void (*)(SimulatedUr&, std::string_view);
   Do act = nullptr;
   double value = 0;  ///< of those that take one
+  Enter enter = nullptr;
+  std::string text{};  ///< of those that take one instead
 };
 
 /// "emergency-stop", "slider=0.5", ... Error: kUsage, with the words that there are.

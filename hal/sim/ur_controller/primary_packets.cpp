@@ -188,10 +188,10 @@ void tool_mode_info(WireWriter& wire) {
 
 void popup_message(const ControllerEvent& event, WireWriter& wire) {
   wire.u32(0);  // request id
-  wire.u8(0);
+  wire.u32(static_cast<std::uint32_t>(RequestedType::kNone));
   wire.flag(event.warning);
   wire.flag(event.error);
-  wire.flag(false);
+  wire.flag(event.blocking);
   wire.u8(static_cast<std::uint8_t>(event.title.size()));
   wire.text(event.title);
   wire.text(event.text);
@@ -287,6 +287,12 @@ std::string event_message(const ControllerEvent& event) {
         wire.i32(event.argument);
         wire.u8(static_cast<std::uint8_t>(event.title.size()));
         wire.text(event.title);
+        wire.text(event.text);
+        break;
+      case Kind::kRequest:
+        wire.u8(9);
+        wire.i32(event.code);
+        wire.i32(event.argument);
         wire.text(event.text);
         break;
       case Kind::kRuntimeException:

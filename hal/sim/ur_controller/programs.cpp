@@ -23,8 +23,13 @@ void Programs::set_sockets(script::Sockets* sockets) {
   sockets_ = sockets;
 }
 
-void Programs::forget() {
+void Programs::drop_program() {
   program_.reset();
+  statements_.step(nullptr);
+}
+
+void Programs::forget() {
+  drop_program();
   request_.reset();
   pending_.reset();
   secondary_.clear();
@@ -39,7 +44,7 @@ void Programs::end_program() {
   if (program_ == nullptr) return;
   if (program_->error()) tell_error(*program_->error());
   controller_.tell({.kind = Kind::kKey, .title = "PROGRAM_XXX_STOPPED", .text = program_->code().name});
-  program_.reset();
+  drop_program();
   controller_.set_script_line(0);
   controller_.watchdogs().clear();
 }
@@ -104,6 +109,8 @@ void Programs::step() {
     if (program_->end()) {
       end_program();
       controller_.stop();
+    } else {
+      statements_.step(program_.get());
     }
   }
   for (const auto& secondary : secondary_) {

@@ -9,6 +9,7 @@
 #include "hal/sim/ur_controller/controller.hpp"
 #include "hal/sim/ur_controller/program_request.hpp"
 #include "hal/sim/ur_controller/script/machine.hpp"
+#include "hal/sim/ur_controller/statement_queue.hpp"
 
 namespace firstlook::sim::ur {
 
@@ -48,6 +49,11 @@ class Programs {
   /// the running program alone and is told as a runtime exception.
   void submit(const std::string& script);
 
+  /// A line that came over the interpreter port.
+  void interpret(std::string_view line, const Mailbox& answers_to) {
+    statements_.receive(line, answers_to, program_.get());
+  }
+
   /// "/programs/cart.urp", empty when nothing is loaded.
   [[nodiscard]] std::string loaded_path() const;
   /// "cart.urp", or "<unnamed>" as the dashboard calls it when nothing is loaded.
@@ -60,6 +66,7 @@ class Programs {
   void follow_watchdogs();
   void begin_pending();
   void end_program();
+  void drop_program();
   void tell_error(const script::ScriptError& error);
 
   Controller& controller_;
@@ -71,6 +78,7 @@ class Programs {
   std::unique_ptr<script::Machine> program_;
   std::unique_ptr<script::Machine> pending_;  ///< begins when the arm stands
   std::vector<std::unique_ptr<script::Machine>> secondary_;
+  StatementQueue statements_;
 };
 
 }  // namespace firstlook::sim::ur

@@ -14,15 +14,29 @@ std::string_view trimmed(std::string_view line) {
   return line;
 }
 
-/// +1 where a line opens a block, -1 where it closes one.
+bool is_letter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+/// Blocks that a line opens, less those that it closes. Strings and comments are passed over.
 int depth_change(std::string_view line) {
   constexpr std::array<std::string_view, 6> kOpening = {"def", "sec", "thread", "if", "while", "for"};
-  std::size_t letters = 0;
-  while (letters < line.size() && ((line[letters] >= 'a' && line[letters] <= 'z') || line[letters] == '_')) ++letters;
-  const std::string_view word = line.substr(0, letters);
-  const char next = letters < line.size() ? line[letters] : '\0';
-  if (std::ranges::find(kOpening, word) != kOpening.end()) return next == ' ' || next == '\t' || next == '(' ? 1 : 0;
-  return word == "end" && (next == '\0' || next == ' ' || next == '\t' || next == '#') ? -1 : 0;
+  int change = 0;
+  for (std::size_t at = 0; at < line.size() && line[at] != '#';) {
+    if (line[at] == '"') {
+      at = std::min(line.find('"', at + 1), line.size() - 1) + 1;
+      continue;
+    }
+    std::size_t end = at;
+    while (end < line.size() && is_letter(line[end])) ++end;
+    const std::string_view word = line.substr(at, end - at);
+    const char next = end < line.size() ? line[end] : '\0';
+    const bool opens = std::ranges::find(kOpening, word) != kOpening.end();
+    if (opens && (next == ' ' || next == '\t' || next == '(')) ++change;
+    if (word == "end") --change;
+    at = std::max(end, at + 1);
+  }
+  return change;
 }
 
 }  // namespace

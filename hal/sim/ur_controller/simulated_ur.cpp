@@ -1,6 +1,7 @@
 #include "hal/sim/ur_controller/simulated_ur.hpp"
 
 #include "hal/sim/ur_controller/happenings_session.hpp"
+#include "hal/sim/ur_controller/interpreter_session.hpp"
 #include "hal/sim/ur_controller/primary_packets.hpp"
 #include "hal/sim/ur_controller/truth_session.hpp"
 #include "platform/core/ensure.hpp"
@@ -25,6 +26,8 @@ std::string_view name_of(Port port) {
       return "secondary, read-only";
     case Port::kRealtimeReadOnly:
       return "realtime, read-only";
+    case Port::kInterpreter:
+      return "interpreter";
     case Port::kHappenings:
       return "what people and mishaps do to it";
     case Port::kTruth:
@@ -64,8 +67,12 @@ void SimulatedUr::reboot() {
   controller_.reboot();
 }
 
+bool SimulatedUr::has(Port port) const {
+  return port != Port::kInterpreter || controller_.identity().series == Series::kESeries;
+}
+
 bool SimulatedUr::serves(Port port) const {
-  return !controller_.booting() || port == Port::kTruth || port == Port::kHappenings;
+  return has(port) && (!controller_.booting() || port == Port::kTruth || port == Port::kHappenings);
 }
 
 Session& SimulatedUr::open(Port port) {
@@ -93,6 +100,9 @@ Session& SimulatedUr::open(Port port) {
       break;
     case Port::kRtde:
       session = std::make_unique<RtdeSession>(controller_, owners_);
+      break;
+    case Port::kInterpreter:
+      session = std::make_unique<InterpreterSession>(programs_);
       break;
     case Port::kHappenings:
       session = std::make_unique<HappeningsSession>(*this);

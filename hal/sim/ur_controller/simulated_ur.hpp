@@ -21,13 +21,14 @@ enum class Port : std::uint16_t {
   kPrimaryReadOnly = 30011,
   kSecondaryReadOnly = 30012,
   kRealtimeReadOnly = 30013,
-  kHappenings = 30098,  ///< private: happenings.hpp
-  kTruth = 30099,       ///< private: truth_session.hpp
+  kInterpreter = 30020,  ///< e-Series only
+  kHappenings = 30098,   ///< private: happenings.hpp
+  kTruth = 30099,        ///< private: truth_session.hpp
 };
-/// What a controller serves.
+/// What controllers serve.
 inline constexpr std::array kPorts = {
-    Port::kDashboard, Port::kPrimary,         Port::kSecondary,         Port::kRealtime,
-    Port::kRtde,      Port::kPrimaryReadOnly, Port::kSecondaryReadOnly, Port::kRealtimeReadOnly};
+    Port::kDashboard,       Port::kPrimary,           Port::kSecondary,        Port::kRealtime,   Port::kRtde,
+    Port::kPrimaryReadOnly, Port::kSecondaryReadOnly, Port::kRealtimeReadOnly, Port::kInterpreter};
 /// "dashboard", "primary", ...
 [[nodiscard]] std::string_view name_of(Port port);
 
@@ -51,7 +52,9 @@ class SimulatedUr {
   /// The controller's computer is switched off and on: every connection and program ends, and for some seconds nobody
   /// answers.
   void reboot();
-  /// False while it boots: no port is there but the private ones.
+  /// Controllers of its generation have this port.
+  [[nodiscard]] bool has(Port port) const;
+  /// False while it boots, too: no port is there but the private ones.
   [[nodiscard]] bool serves(Port port) const;
   void set_remote_control(bool on) { dashboard_.remote_control = on; }
   /// The cable of its network: whoever carries its bytes carries none while it is out.

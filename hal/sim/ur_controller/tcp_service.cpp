@@ -48,6 +48,7 @@ class TcpService final : public TcpEvents, public script::Sockets {
 
   [[nodiscard]] Status listen(const TcpServiceOptions& options) {
     for (const Port port : kPorts) {
+      if (!robot_.has(port)) continue;
       if (const Status listening = listen(options, port); !listening) return listening;
     }
     if (const Status listening = listen(options, Port::kHappenings); !listening) return listening;

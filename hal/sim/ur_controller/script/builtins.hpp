@@ -22,6 +22,7 @@ class Call {
   [[nodiscard]] CallState& state() { return thread_.call; }
 
   [[nodiscard]] const Value& value(std::size_t i) const { return arguments_[i]; }
+  [[nodiscard]] std::span<const Value> values() const { return arguments_; }
   [[nodiscard]] double number(std::size_t i);
   [[nodiscard]] std::int64_t integer(std::size_t i);
   /// Within `low` to `high`, both allowed.
@@ -71,6 +72,9 @@ struct Builtin {
 [[nodiscard]] std::span<const Builtin> robot_builtins();
 [[nodiscard]] std::span<const Builtin> io_builtins();
 [[nodiscard]] std::span<const Builtin> socket_builtins();
+[[nodiscard]] std::span<const Builtin> interpreter_builtins();
+[[nodiscard]] std::span<const Builtin> pendant_builtins();
+[[nodiscard]] std::span<const Builtin> rpc_builtins();
 
 struct Parameter {
   std::string name;

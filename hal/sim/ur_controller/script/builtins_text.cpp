@@ -11,16 +11,6 @@ using Kind = ControllerEvent::Kind;
 
 void textmsg(Call& c) { c.controller().tell({.kind = Kind::kText, .text = text_of(c.value(0)) + text_of(c.value(1))}); }
 
-void popup(Call& c) {
-  c.controller().tell({.kind = Kind::kPopup,
-                       .warning = c.flag(2),
-                       .error = c.flag(3),
-                       .title = text_of(c.value(1)).substr(0, 255),
-                       .text = text_of(c.value(0))});
-  // A blocking one would wait for a person at the pendant: there is none.
-  static_cast<void>(c.flag(4));
-}
-
 void sleep(Call& c) { static_cast<void>(c.waited(std::max(0.0, c.number(0)))); }
 
 void sync(Call& c) {
@@ -82,7 +72,6 @@ void tell_label(Call& c) {
 constexpr Builtin kTable[] = {
     {"$", "id,text", tell_label},
     {"halt", "", halt_program},
-    {"popup", "s,title=\"Popup\",warning=False,error=False,blocking=False", popup},
     {"powerdown", "", powerdown},
     {"protective_stop", "", protective_stop},
     {"sleep", "t", sleep},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,8 @@ enum class Op : std::uint8_t {
   kHalt,
   kEnterCritical,
   kExitCritical,
+  kInterpret,     ///< runs what comes to the interpreter port, until that ends
+  kEndStatement,  ///< of it: back to kInterpret, in the frame of which it ran
 };
 
 enum class BinaryOp : std::uint8_t {
@@ -63,7 +66,7 @@ struct Instruction {
 struct Function {
   std::string name;
   int parameters = 0;
-  int locals = 0;  ///< with the parameters, which come first
+  std::vector<std::string> locals;  ///< their names; the parameters come first
   bool thread = false;
   std::vector<Instruction> instructions;
 };
@@ -75,6 +78,8 @@ struct Code {
   int main = 0;  ///< among the functions
   std::vector<Value> constants;
   std::vector<std::string> globals;
+  // What is compiled into it later may use these names.
+  std::map<std::string, int> function_numbers, global_numbers;
 };
 
 }  // namespace firstlook::sim::ur::script

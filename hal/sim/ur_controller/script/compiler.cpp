@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
+#include "hal/sim/ur_controller/script/names.hpp"
 
 namespace firstlook::sim::ur::script {
 namespace {
@@ -20,18 +21,17 @@ using Kind = Token::Kind;
 constexpr int kNestingMax = 100;  // of blocks and of expressions
 constexpr std::size_t kInstructionsMax = 200'000;
 
-/// Names that begin a block which `end` closes.
-bool opens_block(std::string_view word) {
-  return word == "def" || word == "sec" || word == "thread" || word == "if" || word == "while";
-}
-bool opens_function(std::string_view word) { return word == "def" || word == "sec" || word == "thread"; }
-
 class Compiler {
  public:
-  Compiler(std::string_view script, std::vector<Token> tokens) : script_(script), tokens_(std::move(tokens)) {}
+  /// Adds to `code`, which must outlive the compiler.
+  Compiler(std::string_view script, std::vector<Token> tokens, Code& code)
+      : script_(script), tokens_(std::move(tokens)), code_(code) {}
 
-  std::expected<Code, ScriptError> run() {
-    collect_names();
+  [[nodiscard]] std::optional<ScriptError> program() {
+    const Names names = find_program_names(tokens_);
+    for (const Token& name : names.declared) declare_global(name.text);
+    for (const std::string& name : names.assigned) declare_global(name);
+    declare_functions(names);
     code_.name = "unnamed";
     skip_line_ends();
     const bool whole = tokens_[at_].is("def") || tokens_[at_].is("sec");
@@ -42,12 +42,30 @@ class Compiler {
       skip_line_ends();
       if (tokens_[at_].kind != Kind::kEnd) fail_here();
     } else {
-      begin_function("unnamed", true);
-      while (!error_ && tokens_[at_].kind != Kind::kEnd) statement();
-      code_.main = end_function();
+      code_.main = body("unnamed");
     }
+    keep_function_numbers();
+    return error_;
+  }
+
+  [[nodiscard]] std::expected<StatementLine, ScriptError> statements(int enclosing) {
+    interpreted_ = true;
+    const Names names = find_statement_names(tokens_);
+    const std::vector<std::string> enclosing_locals = code_.functions[static_cast<std::size_t>(enclosing)].locals;
+    for (const Token& name : names.declared) {
+      if (!code_.global_numbers.contains(name.text)) fail_new_global(name);
+    }
+    for (const std::string& name : names.assigned) {
+      if (std::ranges::find(enclosing_locals, name) == enclosing_locals.end()) declare_global(name);
+    }
+    declare_functions(names);
+    StatementLine line;
+    line.function = body("", enclosing_locals);
+    code_.functions[static_cast<std::size_t>(line.function)].locals.clear();  // it brings none of its own
+    line.clears = clears_;
+    keep_function_numbers();
     if (error_) return std::unexpected(*error_);
-    return std::move(code_);
+    return line;
   }
 
  private:
@@ -68,6 +86,9 @@ class Compiler {
   void fail_here() { fail(syntax_error(script_, tokens_[at_].line, tokens_[at_].column)); }
   void fail_name(const Token& name) {
     fail({name.line, name.column, fmt::format("compile_error_name_not_found:{}:", name.text)});
+  }
+  void fail_new_global(const Token& name) {
+    fail({name.line, name.column, fmt::format("compile_error_new_global:{}:", name.text)});
   }
 
   // --- tokens ---
@@ -93,8 +114,9 @@ class Compiler {
     advance();
     return name;
   }
-  void expect_line_end() {
-    if (now().kind == Kind::kEnd) return;
+  /// More than one statement may stand on a line.
+  void end_statement() {
+    if (now().kind == Kind::kEnd || now().kind == Kind::kName) return;
     if (now().kind != Kind::kLineEnd) return fail_here();
     advance();
   }
@@ -103,75 +125,30 @@ class Compiler {
   }
 
   // --- names ---
-  /// Functions may be called above their definition; names that the program's own body assigns, or anybody declares
-  /// `global`, belong to all its functions.
-  void collect_names() {
-    std::vector<bool> functions;  // for each open block: is it a function?
-    int depth = 0;                // of functions
-    bool first = true;
-    for (std::size_t i = 0; i + 1 < tokens_.size(); ++i) {
-      const Token& token = tokens_[i];
-      const bool begins = i == 0 || tokens_[i - 1].kind == Kind::kLineEnd || tokens_[i - 1].is(":");
-      if (!begins || token.kind != Kind::kName) continue;
-      if (opens_block(token.text)) {
-        functions.push_back(opens_function(token.text));
-        if (functions.back()) {
-          const bool program = first && !token.is("thread");
-          if (!program) {
-            function_numbers_.emplace(tokens_[i + 1].text, -1);
-            parameters_[tokens_[i + 1].text] = parameters_at(i + 2);
-          }
-          if (program) program_depth_ = 1;
-          ++depth;
-        }
-        first = false;
-      } else if (token.is("end") && !functions.empty()) {
-        depth -= functions.back() ? 1 : 0;
-        functions.pop_back();
-      } else if (token.is("global")) {
-        declare_global(tokens_[i + 1].text);
-      } else if (depth == program_depth_ && assigns(i) && !sets_signal(i)) {
-        declare_global(token.text);
-      }
-      first = first && token.kind == Kind::kLineEnd;
-    }
+  void declare_functions(const Names& names) {
+    parameters_ = names.functions;
+    for (const auto& [name, parameters] : names.functions) function_numbers_[name] = kNotYetMet;
   }
-  /// The names between the brackets of a function's head.
-  [[nodiscard]] std::vector<std::string> parameters_at(std::size_t i) const {
-    std::vector<std::string> names;
-    int depth = 0;
-    for (; i < tokens_.size() && tokens_[i].kind != Kind::kLineEnd; ++i) {
-      depth += tokens_[i].is("(") || tokens_[i].is("[") ? 1 : tokens_[i].is(")") || tokens_[i].is("]") ? -1 : 0;
-      const bool begins = depth == 1 && (tokens_[i - 1].is("(") || tokens_[i - 1].is(","));
-      if (begins && tokens_[i].kind == Kind::kName) names.push_back(tokens_[i].text);
-      if (depth == 0) break;
-    }
-    return names;
+  void keep_function_numbers() {
+    for (const auto& [name, number] : function_numbers_) code_.function_numbers[name] = number;
   }
-  [[nodiscard]] bool assigns(std::size_t i) const {
-    std::size_t j = i + 1;
-    while (j < tokens_.size() && tokens_[j].is("[")) {
-      int open = 0;
-      do {
-        open += tokens_[j].is("[") ? 1 : tokens_[j].is("]") ? -1 : 0;
-        ++j;
-      } while (j < tokens_.size() && open > 0);
-    }
-    return j < tokens_.size() && tokens_[j].is("=");
+  [[nodiscard]] bool is_function(const std::string& name) const {
+    return function_numbers_.contains(name) || code_.function_numbers.contains(name);
   }
-  /// "digital_out[2] = ...": an output by its old name, not a list of the program's.
-  [[nodiscard]] bool sets_signal(std::size_t i) const {
-    return tokens_[i].is("digital_out") && i + 1 < tokens_.size() && tokens_[i + 1].is("[");
+  [[nodiscard]] std::vector<std::string> parameters_of_function(const std::string& name) const {
+    if (const auto here = parameters_.find(name); here != parameters_.end()) return here->second;
+    const Function& before = code_.functions[static_cast<std::size_t>(code_.function_numbers.at(name))];
+    return {before.locals.begin(), before.locals.begin() + before.parameters};
   }
   void declare_global(const std::string& name) {
-    if (global_numbers_.contains(name)) return;
-    global_numbers_[name] = static_cast<int>(code_.globals.size());
+    if (code_.global_numbers.contains(name)) return;
+    code_.global_numbers[name] = static_cast<int>(code_.globals.size());
     code_.globals.push_back(name);
   }
   int declare_local(const std::string& name) {
     Scope& scope = scopes_.back();
-    const auto [entry, added] = scope.locals.emplace(name, scope.function.locals);
-    if (added) ++scope.function.locals;
+    const auto [entry, added] = scope.locals.emplace(name, static_cast<int>(scope.function.locals.size()));
+    if (added) scope.function.locals.push_back(name);
     return entry->second;
   }
 
@@ -198,22 +175,38 @@ class Compiler {
     scope.number = function_number(name, top);
     scopes_.push_back(std::move(scope));
   }
+  /// Of a function of this script; the same whether it is called first or defined.
   int function_number(const std::string& name, bool top) {
     const auto known = top ? function_numbers_.end() : function_numbers_.find(name);
-    if (known != function_numbers_.end() && known->second >= 0) return known->second;
+    if (known != function_numbers_.end() && known->second != kNotYetMet) return known->second;
     code_.functions.emplace_back();
     const int number = static_cast<int>(code_.functions.size()) - 1;
     if (known != function_numbers_.end()) known->second = number;
     return number;
   }
+  /// And of one of the program that this is compiled into.
+  int called_number(const std::string& name) {
+    return function_numbers_.contains(name) ? function_number(name, false) : code_.function_numbers.at(name);
+  }
   int end_function() {
-    code_.constants.emplace_back();
-    emit(Op::kConstant, static_cast<int>(code_.constants.size()) - 1);
-    emit(Op::kReturn);
+    if (interpreted_ && scopes_.size() == 1) {
+      emit(Op::kEndStatement);
+    } else {
+      code_.constants.emplace_back();
+      emit(Op::kConstant, static_cast<int>(code_.constants.size()) - 1);
+      emit(Op::kReturn);
+    }
     const int number = scopes_.back().number;
     code_.functions[static_cast<std::size_t>(number)] = std::move(scopes_.back().function);
     scopes_.pop_back();
     return number;
+  }
+  /// Statements to the end of the script, which see these locals.
+  int body(const std::string& name, const std::vector<std::string>& locals = {}) {
+    begin_function(name, true);
+    for (const std::string& local : locals) declare_local(local);
+    while (!error_ && tokens_[at_].kind != Kind::kEnd) statement();
+    return end_function();
   }
   /// From `def`, `sec` or `thread` to its `end`.
   int function(bool top) {
@@ -234,7 +227,7 @@ class Compiler {
     expect(":");
     block();
     expect("end");
-    if (!error_) expect_line_end();
+    if (!error_) end_statement();
     return end_function();
   }
 
@@ -250,12 +243,14 @@ class Compiler {
   void block() {
     if (++nesting_ > kNestingMax) fail_here();
     skip_line_ends();
-    while (!error_ && !now().is("end") && !now().is("elif") && !now().is("else")) {
+    while (!error_ && !ends_block()) {
       if (now().kind == Kind::kEnd) return fail_here();
       statement();
     }
     --nesting_;
   }
+
+  [[nodiscard]] bool ends_block() const { return now().is("end") || now().is("elif") || now().is("else"); }
 
   void statement() {
     skip_line_ends();
@@ -268,33 +263,27 @@ class Compiler {
       if_statement();
     } else if (now().is("while")) {
       while_statement();
-    } else if (accept("return")) {
-      if (now().kind == Kind::kLineEnd) {
-        constant({});
-      } else {
-        expression();
-      }
-      emit(Op::kReturn);
-      expect_line_end();
+    } else if (now().is("return")) {
+      return_statement();
     } else if (now().is("break") || now().is("continue")) {
       leave_loop();
     } else if (accept("halt")) {
       emit(Op::kHalt);
-      expect_line_end();
+      end_statement();
     } else if (accept("pass")) {
-      expect_line_end();
+      end_statement();
     } else if (accept("enter_critical")) {
       emit(Op::kEnterCritical);
-      expect_line_end();
+      end_statement();
     } else if (accept("exit_critical")) {
       emit(Op::kExitCritical);
-      expect_line_end();
+      end_statement();
     } else if (now().is("join") || now().is("kill")) {
       const Op op = now().is("join") ? Op::kJoin : Op::kKill;
       advance();
       expression();
       emit(op);
-      expect_line_end();
+      end_statement();
     } else {
       assignment_or_call();
     }
@@ -314,7 +303,19 @@ class Compiler {
     if (now().kind == Kind::kText) advance();
     emit_at(where, Op::kCallBuiltin, find_builtin("$"), 2);
     emit(Op::kPop);
-    expect_line_end();
+    end_statement();
+  }
+
+  void return_statement() {
+    if (interpreted_ && scopes_.size() == 1) return fail_here();
+    advance();
+    if (now().kind == Kind::kLineEnd || ends_block()) {
+      constant({});
+    } else {
+      expression();
+    }
+    emit(Op::kReturn);
+    end_statement();
   }
 
   void if_statement() {
@@ -334,7 +335,7 @@ class Compiler {
     }
     expect("end");
     for (const int jump : to_end) aim(jump);
-    if (!error_) expect_line_end();
+    if (!error_) end_statement();
   }
 
   void while_statement() {
@@ -352,7 +353,7 @@ class Compiler {
     for (const std::size_t jump : scopes_.back().breaks.back()) aim(static_cast<int>(jump));
     scopes_.back().breaks.pop_back();
     scopes_.back().loop_begins.pop_back();
-    if (!error_) expect_line_end();
+    if (!error_) end_statement();
   }
 
   void leave_loop() {
@@ -364,13 +365,13 @@ class Compiler {
       emit(Op::kJump, scope.loop_begins.back());
     }
     advance();
-    expect_line_end();
+    end_statement();
   }
 
   void assignment_or_call() {
     const bool global = now().is("global"), local = now().is("local");
     if (global || local) advance();
-    if (now().kind == Kind::kName && assigns(at_)) {
+    if (now().kind == Kind::kName && assigns(tokens_, at_)) {
       assignment(global, local);
     } else if (global && now().kind == Kind::kName) {
       advance();  // a declaration alone
@@ -380,11 +381,11 @@ class Compiler {
       expression();
       emit(Op::kPop);
     }
-    expect_line_end();
+    end_statement();
   }
 
   [[nodiscard]] bool known(const std::string& name) const {
-    return scopes_.back().locals.contains(name) || global_numbers_.contains(name);
+    return scopes_.back().locals.contains(name) || code_.global_numbers.contains(name);
   }
 
   /// The index, and where a value is given that, too.
@@ -402,7 +403,7 @@ class Compiler {
 
   void assignment(bool global, bool local) {
     const Token target = now();
-    if (sets_signal(at_) && !known(target.text)) {
+    if (sets_signal(tokens_, at_) && !known(target.text)) {
       signal(target, "set_digital_out", true);
       emit(Op::kPop);
       return;
@@ -423,10 +424,13 @@ class Compiler {
 
   void store(const Token& target, bool global, bool local) {
     Scope& scope = scopes_.back();
-    const bool shared = global_numbers_.contains(target.text);
+    const bool shared = code_.global_numbers.contains(target.text);
     const bool own = scope.locals.contains(target.text);
     if (global || (shared && !own && !(local && !scope.top))) {
-      emit_at(target, Op::kStoreGlobal, global_numbers_[target.text]);
+      emit_at(target, Op::kStoreGlobal, code_.global_numbers[target.text]);
+    } else if (interpreted_ && scopes_.size() == 1 && !own) {
+      declare_global(target.text);  // the frame is another function's: it has no room for more
+      emit_at(target, Op::kStoreGlobal, code_.global_numbers[target.text]);
     } else {
       emit_at(target, Op::kStoreLocal, declare_local(target.text));
     }
@@ -436,7 +440,7 @@ class Compiler {
     const Scope& scope = scopes_.back();
     if (const auto own = scope.locals.find(name.text); own != scope.locals.end()) {
       emit_at(name, Op::kLoadLocal, own->second);
-    } else if (const auto shared = global_numbers_.find(name.text); shared != global_numbers_.end()) {
+    } else if (const auto shared = code_.global_numbers.find(name.text); shared != code_.global_numbers.end()) {
       emit_at(name, Op::kLoadGlobal, shared->second);
     } else {
       fail_name(name);
@@ -530,13 +534,27 @@ class Compiler {
   }
   void element() {
     primary();
-    while (!error_ && now().is("[")) {
+    while (!error_ && (now().is("[") || now().is("."))) {
       const Token where = now();
+      if (where.is(".")) {
+        method();
+        continue;
+      }
       advance();
       expression();
       expect("]");
       emit_at(where, Op::kIndex);
     }
+  }
+
+  /// handle.method(arguments), which are by position alone.
+  void method() {
+    advance();
+    const Token name = now();
+    constant(expect_name());
+    expect("(");
+    const int count = elements(")");
+    emit_at(name, Op::kCallBuiltin, find_builtin("."), count + 2);
   }
 
   void primary() {
@@ -577,18 +595,18 @@ class Compiler {
   }
 
   /// Expressions up to the closing bracket; how many.
-  int elements() {
+  int elements(std::string_view closing) {
     int count = 0;
-    while (!error_ && !now().is("]")) {
+    while (!error_ && !now().is(closing)) {
       expression();
       ++count;
       if (!accept(",")) break;
     }
-    expect("]");
+    expect(closing);
     return count;
   }
 
-  void list() { emit(Op::kMakeList, elements()); }
+  void list() { emit(Op::kMakeList, elements("]")); }
 
   void named(const Token& token) {
     if (token.is("True") || token.is("False")) {
@@ -613,7 +631,7 @@ class Compiler {
     advance();
     advance();
     const int begin = here();
-    const int count = elements();
+    const int count = elements("]");
     if (error_) return;
     if (count == 6) {
       emit_at(token, Op::kMakePose);
@@ -635,18 +653,17 @@ class Compiler {
   void run_thread() {
     advance();
     const Token name = now();
-    const auto found = function_numbers_.find(name.text);
-    if (name.kind != Kind::kName || found == function_numbers_.end()) return fail_name(name);
+    if (name.kind != Kind::kName || !is_function(name.text)) return fail_name(name);
     advance();
     expect("(");
     expect(")");
-    emit_at(name, Op::kRun, function_number(name.text, false));
+    emit_at(name, Op::kRun, called_number(name.text));
   }
 
   void call(const Token& name) {
     advance();
     advance();
-    if (function_numbers_.contains(name.text)) return call_function(name);
+    if (is_function(name.text)) return call_function(name);
     const int builtin = find_builtin(name.text);
     if (builtin < 0) return fail_name(name);
     call_builtin(name, builtin);
@@ -654,15 +671,19 @@ class Compiler {
 
   void call_function(const Token& name) {
     std::vector<Parameter> parameters;
-    for (const std::string& parameter : parameters_[name.text]) parameters.push_back({parameter, true, {}});
+    for (const std::string& parameter : parameters_of_function(name.text)) parameters.push_back({parameter, true, {}});
     arguments(name, parameters);
-    emit_at(name, Op::kCall, function_number(name.text, false), static_cast<int>(parameters.size()));
+    emit_at(name, Op::kCall, called_number(name.text), static_cast<int>(parameters.size()));
   }
 
   void call_builtin(const Token& name, int builtin) {
+    const bool interprets = name.is("interpreter_mode");
+    if (interprets && interpreted_) return fail({name.line, name.column, "compile_error_nested_interpreter_mode:"});
+    clears_ = clears_ || (name.is("clear_interpreter") && scopes_.size() == 1);
     const std::vector<Parameter> parameters = parameters_of(builtin);
     arguments(name, parameters);
     emit_at(name, Op::kCallBuiltin, builtin, static_cast<int>(parameters.size()));
+    if (interprets) emit_at(name, Op::kInterpret);
   }
 
   /// Arguments by position or by name, and the defaults of the others, pushed in the order of the parameters.
@@ -719,16 +740,18 @@ class Compiler {
     }
   }
 
+  static constexpr int kNotYetMet = -1;
+
   std::string_view script_;
   std::vector<Token> tokens_;
+  Code& code_;
   std::size_t at_ = 0;
   std::optional<ScriptError> error_;
-  Code code_;
   std::vector<Scope> scopes_;
-  std::map<std::string, int> function_numbers_;                 ///< -1: not yet met
-  std::map<std::string, std::vector<std::string>> parameters_;  ///< of each function
-  std::map<std::string, int> global_numbers_;
-  int program_depth_ = 0;  ///< 1 where a `def` or `sec` holds everything
+  std::map<std::string, int> function_numbers_;                 ///< of the functions of this script
+  std::map<std::string, std::vector<std::string>> parameters_;  ///< and their parameters
+  bool interpreted_ = false;  ///< statements for another function's frame, which is the first scope
+  bool clears_ = false;
   int nesting_ = 0;
   std::size_t instructions_ = 0;
 };
@@ -738,7 +761,30 @@ class Compiler {
 std::expected<Code, ScriptError> compile(std::string_view script) {
   auto tokens = tokenize(script);
   if (!tokens) return std::unexpected(tokens.error());
-  return Compiler(script, std::move(*tokens)).run();
+  Code code;
+  if (auto error = Compiler(script, std::move(*tokens), code).program()) return std::unexpected(std::move(*error));
+  return code;
+}
+
+CodeMark mark_of(const Code& code) {
+  return {code.functions.size(), code.constants.size(), code.globals.size(), code.function_numbers};
+}
+
+void take_back(Code& code, const CodeMark& mark) {
+  for (std::size_t i = mark.globals; i < code.globals.size(); ++i) code.global_numbers.erase(code.globals[i]);
+  code.functions.resize(mark.functions);
+  code.constants.resize(mark.constants);
+  code.globals.resize(mark.globals);
+  code.function_numbers = mark.function_numbers;
+}
+
+std::expected<StatementLine, ScriptError> compile_statements(std::string_view line, Code& code, int scope) {
+  auto tokens = tokenize(line);
+  if (!tokens) return std::unexpected(tokens.error());
+  const CodeMark mark = mark_of(code);
+  auto compiled = Compiler(line, std::move(*tokens), code).statements(scope);
+  if (!compiled) take_back(code, mark);
+  return compiled;
 }
 
 }  // namespace firstlook::sim::ur::script

@@ -31,7 +31,7 @@ Machine::Machine(Code code, Controller& controller, Sockets* sockets)
   Thread main;
   main.number = next_thread_++;
   main.frames.push_back({code_.main, 0, 0});
-  main.stack.resize(static_cast<std::size_t>(code_.functions[static_cast<std::size_t>(code_.main)].locals));
+  main.stack.resize(code_.functions[static_cast<std::size_t>(code_.main)].locals.size());
   threads_.push_back(std::move(main));
 }
 
@@ -154,7 +154,7 @@ bool Machine::execute_call(Thread& thread, const Instruction& instruction) {
   const auto count = static_cast<std::size_t>(instruction.b);
   ++thread.frames.back().next;
   thread.frames.push_back({instruction.a, 0, thread.stack.size() - count});
-  thread.stack.resize(thread.stack.size() - count + static_cast<std::size_t>(function.locals));
+  thread.stack.resize(thread.stack.size() - count + function.locals.size());
   return true;
 }
 
@@ -185,8 +185,9 @@ bool Machine::execute_thread_op(Thread& thread, const Instruction& instruction) 
     if (threads_.size() >= kThreadsMax) return fail(instruction, "Too many threads"), false;
     Thread started;
     started.number = next_thread_++;
+    started.interpreted = thread.interpreted || (interpreter_.active() && thread.number == kMainThread);
     started.frames.push_back({instruction.a, 0, 0});
-    started.stack.resize(static_cast<std::size_t>(function.locals));
+    started.stack.resize(function.locals.size());
     thread.stack.emplace_back(ThreadHandle{started.number});
     threads_.push_back(std::move(started));
     ++thread.frames.back().next;
@@ -247,6 +248,11 @@ bool Machine::execute(Thread& thread) {
     case Op::kJoin:
     case Op::kKill:
       return execute_thread_op(thread, instruction);
+    case Op::kInterpret:
+      return execute_interpret(thread);
+    case Op::kEndStatement:
+      thread.frames.pop_back();
+      return true;
     case Op::kReturn: {
       Value value = pop(thread);
       stack.resize(frame.base);

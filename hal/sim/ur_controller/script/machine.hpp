@@ -9,6 +9,7 @@
 
 #include "hal/sim/ur_controller/controller.hpp"
 #include "hal/sim/ur_controller/script/code.hpp"
+#include "hal/sim/ur_controller/script/interpreter_mode.hpp"
 #include "hal/sim/ur_controller/script/lexer.hpp"
 #include "hal/sim/ur_controller/script/sockets.hpp"
 
@@ -33,8 +34,9 @@ struct Thread {
   std::vector<Frame> frames;
   std::vector<Value> stack;
   CallState call;
-  bool waiting = false;  ///< ended its cycle in a builtin, or in a join
-  int busy_cycles = 0;   ///< one after the other, without waiting
+  bool waiting = false;      ///< ended its cycle in a builtin, or in a join
+  bool interpreted = false;  ///< begun by a statement of the interpreter port: ends when that is cleared
+  int busy_cycles = 0;       ///< one after the other, without waiting
 };
 
 class Machine {
@@ -54,6 +56,13 @@ class Machine {
   [[nodiscard]] const std::optional<ScriptError>& error() const { return error_; }
   [[nodiscard]] const Code& code() const { return code_; }
 
+  // For the interpreter port, between two cycles.
+  [[nodiscard]] InterpreterMode& interpreter() { return interpreter_; }
+  /// A line for interpreter mode; its id.
+  [[nodiscard]] std::expected<int, ScriptError> interpret(std::string_view line);
+  /// A movej or movel that is under way brakes, and is over when the arm stands.
+  void abort_path();
+
   // For builtins.
   [[nodiscard]] Controller& controller() { return controller_; }
   [[nodiscard]] Sockets* sockets() { return sockets_; }
@@ -68,14 +77,20 @@ class Machine {
   [[nodiscard]] bool take_arm(const Thread& thread);
   void release_arm(const Thread& thread);
   [[nodiscard]] std::array<bool, 32>& flags() { return flags_; }
+  /// False where that cannot be: in another thread than the main one, in a secondary program, or nested.
+  [[nodiscard]] bool enter_interpreter_mode(const Thread& thread, bool clear_queue, bool clear_on_end);
 
  private:
+  static constexpr std::int64_t kMainThread = 1;
+
   void run(Thread& thread);
   /// False when the thread waits or is gone.
   [[nodiscard]] bool execute(Thread& thread);
   [[nodiscard]] bool execute_call(Thread& thread, const Instruction& instruction);
   [[nodiscard]] bool execute_builtin(Thread& thread, const Instruction& instruction);
   [[nodiscard]] bool execute_thread_op(Thread& thread, const Instruction& instruction);
+  [[nodiscard]] bool execute_interpret(Thread& thread);
+  void clear_interpreted();
   void fail(const Instruction& at, std::string text);
   [[nodiscard]] Thread* find(std::int64_t number);
   [[nodiscard]] bool excluded(const Thread& thread);
@@ -89,10 +104,11 @@ class Machine {
   Sockets* sockets_;
   std::vector<Value> globals_;
   std::vector<Thread> threads_;  ///< the first is the main one
-  std::int64_t next_thread_ = 1;
+  std::int64_t next_thread_ = kMainThread;
   std::uint64_t cycles_ = 0;
   std::uint64_t made_ = 0;  ///< weight of the values that were made for one thread in this cycle
   std::int64_t arm_owner_ = 0, critical_owner_ = 0;
+  InterpreterMode interpreter_;
   std::map<std::string, std::uint64_t> socket_names_;
   std::array<bool, 32> flags_{};
   std::optional<End> end_;

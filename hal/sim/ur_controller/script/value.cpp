@@ -28,7 +28,7 @@ void append(std::string& text, const Value& value) {
     }
     text += ']';
   } else {
-    text += value.empty() ? "None" : "thread";
+    text += value.empty() ? "None" : type_name(value);
   }
 }
 
@@ -59,7 +59,7 @@ std::string text_of(const Value& value) {
 }
 
 std::string_view type_name(const Value& value) {
-  constexpr std::string_view kNames[] = {"none", "bool", "int", "float", "string", "list", "pose", "thread"};
+  constexpr std::string_view kNames[] = {"none", "bool", "int", "float", "string", "list", "pose", "thread", "rpc"};
   return kNames[value.content.index()];
 }
 
@@ -70,6 +70,7 @@ bool equal(const Value& a, const Value& b) {
   if (const auto* text = a.as<std::string>()) return *text == *b.as<std::string>();
   if (const auto* pose = a.as<PoseValue>()) return pose->pose == b.as<PoseValue>()->pose;
   if (const auto* thread = a.as<ThreadHandle>()) return thread->number == b.as<ThreadHandle>()->number;
+  if (const auto* rpc = a.as<RpcHandle>()) return rpc->url == b.as<RpcHandle>()->url;
   if (const auto* list = a.as<List>()) return std::ranges::equal(*list, *b.as<List>(), equal);
   return true;
 }

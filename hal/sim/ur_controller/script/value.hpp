@@ -19,12 +19,17 @@ struct PoseValue {
 struct ThreadHandle {
   std::int64_t number = 0;
 };
+/// A server whose functions can be called.
+struct RpcHandle {
+  std::string url;
+};
 
 inline constexpr std::uint32_t kWeightMax = 20'000;  // elements of a list with all its lists
 inline constexpr std::size_t kTextBytesMax = 64 * 1024;
 
 struct Value {
-  std::variant<std::monostate, bool, std::int64_t, double, std::string, List, PoseValue, ThreadHandle> content;
+  std::variant<std::monostate, bool, std::int64_t, double, std::string, List, PoseValue, ThreadHandle, RpcHandle>
+      content;
   std::uint32_t weight = 1;  ///< of a list: 1 and what its elements weigh
 
   Value() = default;
@@ -35,10 +40,11 @@ struct Value {
       : content(std::move(value)),
         weight(1 + static_cast<std::uint32_t>(std::get<std::string>(content).size() / 32)) {
   }  // NOLINT(google-explicit-constructor)
-  Value(const char*) = delete;                                  // would become a bool
-  Value(const PoseValue& value) : content(value), weight(6) {}  // NOLINT(google-explicit-constructor)
-  Value(ThreadHandle value) : content(value) {}                 // NOLINT(google-explicit-constructor)
-  Value(List value);                                            // NOLINT(google-explicit-constructor)
+  Value(const char*) = delete;                                      // would become a bool
+  Value(const PoseValue& value) : content(value), weight(6) {}      // NOLINT(google-explicit-constructor)
+  Value(ThreadHandle value) : content(value) {}                     // NOLINT(google-explicit-constructor)
+  Value(List value);                                                // NOLINT(google-explicit-constructor)
+  Value(RpcHandle value) : content(std::move(value)), weight(8) {}  // NOLINT(google-explicit-constructor)
 
   template <typename T>
   [[nodiscard]] const T* as() const {

@@ -23,12 +23,13 @@ TEST_CASE("what can happen is told in words, and read from them", "[ur]") {
   for (std::string line; std::getline(lines, line); ++count) {
     std::string word = line.substr(2, line.find(' ', 2) - 2);
     if (const std::size_t equals = word.find("=NUMBER"); equals != std::string::npos) word.replace(equals, 7, "=0.5");
+    if (const std::size_t equals = word.find("=TEXT"); equals != std::string::npos) word.replace(equals, 5, "=a=b");
     INFO(word);
     CHECK(read_happening(word));
     CHECK(read_timed_happening("2.5=" + word)->stamp == Instant{2'500'000'000});
   }
   CHECK(count > 15);
-  for (const char* wrong : {"", "estop", "slider", "slider=2", "slider=x", "stop=1", "clock=nan"}) {
+  for (const char* wrong : {"", "estop", "slider", "slider=2", "slider=x", "stop=1", "clock=nan", "answer"}) {
     const auto read = read_happening(wrong);
     REQUIRE_FALSE(read);
     CHECK(read.error().fault == Fault::kUsage);

@@ -44,6 +44,12 @@ const std::vector<std::string> kScripts = {
     "speedj([0.1,0,0,0,0,0], 1, 0.1)\n",
     "stopj(2)\n",
     "end\n",
+    "interpreter_mode(False, False)\n",
+    "clear_interpreter()\n",
+    "end_interpreter()\n",
+    "skipbuffer\n",
+    "abort\n",
+    "stateunexecuted\n",
 };
 
 }  // namespace
@@ -64,6 +70,8 @@ TEST_CASE("random bytes on every port", "[ur]") {
   Random random(1);
   for (int trial = 0; trial < trials(300); ++trial) {
     UrRobot robot(trial % 2 == 0 ? "ur5" : "ur5e");
+    robot.robot.programs().submit("interpreter_mode()\n");
+    robot.run(0.02);
     for (const Port port : kPorts) {
       const auto& pieces = port == Port::kRtde ? packages : port == Port::kDashboard ? lines : kScripts;
       Session& session = robot.robot.open(port);
@@ -89,6 +97,31 @@ TEST_CASE("mutated scripts are refused or run", "[ur][script]") {
     }
   }
   CHECK(compiled > 100 / kTrialDivisor);
+}
+
+TEST_CASE("mutated statements are refused and leave the program as it was, or are added", "[ur][script]") {
+  Random random(3);
+  auto code = script::compile("def prog():\n  def f(a):\n    local b = a\n    return b\n  end\n  x = f(1)\nend\n");
+  REQUIRE(code);
+  int added = 0;
+  for (int trial = 0; trial < trials(5'000); ++trial) {
+    const script::CodeMark before = script::mark_of(*code);
+    const int scope = random.below(2);
+    const auto line = script::compile_statements(mutated(kScripts, random), *code, scope);
+    if (line) {
+      ++added;
+      CHECK(static_cast<std::size_t>(line->function) >= before.functions);
+      for (std::size_t i = before.functions; i < code->functions.size(); ++i) {
+        CHECK_FALSE(code->functions[i].instructions.empty());
+      }
+      script::take_back(*code, before);
+    }
+    CHECK(code->functions.size() == before.functions);
+    CHECK(code->globals.size() == before.globals);
+    CHECK(code->function_numbers == before.function_numbers);
+    CHECK(code->global_numbers.size() == before.globals);
+  }
+  CHECK(added > 100 / kTrialDivisor);
 }
 
 }  // namespace firstlook

@@ -25,6 +25,9 @@ TEST_CASE("lines and blocks are cut from a stream", "[ur]") {
   CHECK(programs("sec s():\nthread t():\nend\nend\nx=1\n").size() == 2);
   CHECK(programs("def f():\n").empty());
   CHECK(programs("defx = 1\nend_of = 2\n").size() == 2);
+  // Whole blocks on one line; words in strings are none.
+  CHECK(programs("def f(): while x: y() end end\nx = 1\n").size() == 2);
+  CHECK(programs("def f():\n  a(\"if # end\") if x: y() end\nend\nx = 1\n").size() == 2);
 }
 
 TEST_CASE("the last line may miss its end", "[ur]") {

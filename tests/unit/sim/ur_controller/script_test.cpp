@@ -1,55 +1,13 @@
 #include <catch2/catch.hpp>
 
 #include "hal/sim/ur_controller/script/compiler.hpp"
-#include "tests/support/ur_robot.hpp"
-#include "tests/support/ur_wire.hpp"
+#include "tests/support/script_robot.hpp"
 
 namespace firstlook {
 using namespace sim::ur;
 using namespace test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
-
-namespace {
-
-/// A robot with a client on its primary port.
-struct ScriptRobot : UrRobot {
-  Session& primary;
-  std::vector<std::string> texts, keys;
-  struct Exception {
-    int line, column;
-    std::string text;
-  };
-  std::vector<Exception> exceptions;
-
-  explicit ScriptRobot(const char* model = "ur5e") : UrRobot(model), primary(robot.open(Port::kPrimary)) {}
-
-  void send(const std::string& script, double run_s = 0.5) {
-    primary.receive(script);
-    listen(run_s);
-  }
-  void listen(double run_s) {
-    run(run_s);
-    for (const UrPacket& packet : take_packets(primary.output())) {
-      if (packet.type != 20) continue;
-      const std::string content = packet.content.substr(10);
-      if (packet.content[9] == 0) texts.push_back(content);
-      if (packet.content[9] == 7) keys.push_back(content.substr(9));
-      if (packet.content[9] == 10) exceptions.push_back({int_at(content, 0), int_at(content, 4), content.substr(8)});
-    }
-  }
-  /// What textmsg says of an expression.
-  std::string value(const std::string& expression) {
-    texts.clear();
-    exceptions.clear();
-    send("def f():\n  x = " + expression + "\n  textmsg(x)\nend\n", 0.1);
-    if (!exceptions.empty()) return "! " + exceptions[0].text;
-    REQUIRE(texts.size() == 1);
-    return texts[0];
-  }
-};
-
-}  // namespace
 
 TEST_CASE("expressions", "[ur][script]") {
   ScriptRobot robot;
