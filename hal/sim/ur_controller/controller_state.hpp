@@ -46,6 +46,7 @@ struct InputsOutputs {
   std::uint32_t tool_analog_types = 0b11;
   std::array<double, 2> tool_analog_inputs{};
   int tool_voltage_v = 0;
+  std::array<bool, 32> flags{};  ///< outputs without a wire: they outlive programs, too
 
   [[nodiscard]] bool output(int bit) const { return (digital_outputs >> bit & 1) != 0; }
   void set_output(int bit, bool value) {

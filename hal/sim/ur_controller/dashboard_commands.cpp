@@ -102,13 +102,9 @@ std::string is_program_saved(DashboardSession& s, Argument) {
   return fmt::format("true {}", s.programs().loaded_name());
 }
 
-std::string popup(DashboardSession& s, Argument text) {
-  s.dashboard().popup = text;
-  return "showing popup";
-}
+std::string popup(DashboardSession&, Argument) { return "showing popup"; }
 
 std::string close_popup(DashboardSession& s, Argument) {
-  s.dashboard().popup.clear();
   s.controller().close_popup();
   return "closing popup";
 }

@@ -11,7 +11,6 @@ namespace firstlook::sim::ur {
 
 /// What the dashboard keeps for all its clients.
 struct DashboardState {
-  std::string popup;  ///< shown on the pendant; empty: none
   std::string operational_mode = "NONE";
   std::string user_role = "PROGRAMMER";
   int flight_reports = 0;

@@ -84,9 +84,10 @@ void set_tool_voltage(Call& c) {
 
 void set_flag(Call& c) {
   const auto i = static_cast<std::size_t>(c.integer(0, 0, 31));
-  c.machine().flags()[i] = c.flag(1);
+  const bool value = c.flag(1);
+  if (c.ok()) c.controller().io().flags[i] = value;
 }
-void get_flag(Call& c) { c.answer(bool{c.machine().flags()[static_cast<std::size_t>(c.integer(0, 0, 31))]}); }
+void get_flag(Call& c) { c.answer(bool{c.robot().io.flags[static_cast<std::size_t>(c.integer(0, 0, 31))]}); }
 
 std::size_t register_number(Call& c) { return static_cast<std::size_t>(c.integer(0, 0, kRegisters - 1)); }
 std::size_t bit_number(Call& c) { return static_cast<std::size_t>(c.integer(0, 0, 127)); }

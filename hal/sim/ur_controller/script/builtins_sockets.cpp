@@ -2,6 +2,7 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
 #include "hal/sim/ur_controller/wire.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 constexpr double kOpenTimeout_s = 2;
 constexpr std::size_t kSocketsMax = 16;
+constexpr std::int64_t kNoInteger = -1;
+constexpr double kNoFloat = std::numeric_limits<double>::quiet_NaN();
 
 bool is_open(Call& c, std::uint64_t socket) {
   return socket != 0 && c.machine().sockets()->state(socket) == Sockets::State::kOpen;
@@ -78,12 +81,11 @@ bool gave_up(Call& c, const std::string& name, double timeout_s) {
   return c.waited(timeout_s);
 }
 
-/// A list of its length and `count` values, of which there are none after a timeout.
-void answer_values(Call& c, List values, std::int64_t count) {
+/// A list of its length and `count` values: after a timeout of length 0, and each is `missing`.
+void answer_values(Call& c, List values, std::int64_t count, const Value& missing) {
   List answer;
   answer.emplace_back(values.empty() ? std::int64_t{0} : count);
-  const auto padded = static_cast<std::size_t>(count);
-  values.resize(padded, Value(std::int64_t{0}));
+  values.resize(static_cast<std::size_t>(count), missing);
   for (Value& value : values) answer.push_back(std::move(value));
   c.answer(std::move(answer));
 }
@@ -97,7 +99,7 @@ void read_binary(Call& c) {
   std::string* bytes = received(c, name);
   const std::size_t wanted = static_cast<std::size_t>(count) * Bytes;
   if (bytes == nullptr || bytes->size() < wanted) {
-    if (bytes == nullptr || gave_up(c, name, timeout_s)) answer_values(c, {}, count);
+    if (bytes == nullptr || gave_up(c, name, timeout_s)) answer_values(c, {}, count, kNoInteger);
     return;
   }
   List values;
@@ -106,7 +108,7 @@ void read_binary(Call& c) {
     values.emplace_back(Bytes == 4 ? std::int64_t{wire.i32()} : std::int64_t{wire.u8()});
   }
   bytes->erase(0, wanted);
-  answer_values(c, std::move(values), count);
+  answer_values(c, std::move(values), count, kNoInteger);
 }
 
 /// "(1.5, 2, 3)": so many numbers between brackets.
@@ -118,7 +120,7 @@ void read_ascii_float(Call& c) {
   std::string* bytes = received(c, name);
   const std::size_t end = bytes == nullptr ? std::string::npos : bytes->find(')');
   if (end == std::string::npos) {
-    if (bytes == nullptr || gave_up(c, name, timeout_s)) answer_values(c, {}, count);
+    if (bytes == nullptr || gave_up(c, name, timeout_s)) answer_values(c, {}, count, kNoFloat);
     return;
   }
   const std::size_t begin = bytes->rfind('(', end);
@@ -133,7 +135,7 @@ void read_ascii_float(Call& c) {
   }
   bytes->erase(0, end + 1);
   if (values.size() < static_cast<std::size_t>(count)) values.clear();
-  answer_values(c, std::move(values), count);
+  answer_values(c, std::move(values), count, kNoFloat);
 }
 
 void read_line(Call& c) {

@@ -76,7 +76,6 @@ class Machine {
   /// False when another thread moves the arm. `line` 0 lets it go.
   [[nodiscard]] bool take_arm(const Thread& thread);
   void release_arm(const Thread& thread);
-  [[nodiscard]] std::array<bool, 32>& flags() { return flags_; }
   /// False where that cannot be: in another thread than the main one, in a secondary program, or nested.
   [[nodiscard]] bool enter_interpreter_mode(const Thread& thread, bool clear_queue, bool clear_on_end);
 
@@ -110,7 +109,6 @@ class Machine {
   std::int64_t arm_owner_ = 0, critical_owner_ = 0;
   InterpreterMode interpreter_;
   std::map<std::string, std::uint64_t> socket_names_;
-  std::array<bool, 32> flags_{};
   std::optional<End> end_;
   std::optional<ScriptError> error_;
 };

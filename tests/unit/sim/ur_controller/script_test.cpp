@@ -587,6 +587,14 @@ class FakePeer final : public script::Sockets {
 
 }  // namespace
 
+TEST_CASE("flags outlive the program that set them", "[ur][script]") {
+  ScriptRobot robot;
+  robot.send("def one():\n  set_flag(31, True)\n  set_flag(3, get_flag(31))\n  set_flag(31, False)\nend\n", 0.1);
+  robot.send("def two():\n  textmsg(get_flag(3), get_flag(31))\nend\n", 0.1);
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"TrueFalse"});
+}
+
 TEST_CASE("a script talks to another computer", "[ur][script]") {
   FakePeer peer;
   ScriptRobot robot;
@@ -601,6 +609,8 @@ TEST_CASE("a script talks to another computer", "[ur][script]") {
   textmsg(socket_read_line("pc", 0.2))
   textmsg(socket_read_ascii_float(2, "pc", 0))
   textmsg(socket_read_binary_integer(1, "pc", 0.1))
+  textmsg(socket_read_byte_list(2, "pc", 0.1))
+  textmsg(socket_read_ascii_float(2, "pc", 0.1))
   socket_close("pc")
   textmsg(socket_send_line("x", "pc"))
 end
@@ -613,7 +623,8 @@ end
   robot.listen(0.1);
   peer.to_robot += " -2)";
   robot.listen(0.5);
-  CHECK(robot.texts == std::vector<std::string>{"True", "[2, 7, -2]", "a line", "[2, 1.5, -2]", "[0, 0]", "False"});
+  CHECK(robot.texts == std::vector<std::string>{"True", "[2, 7, -2]", "a line", "[2, 1.5, -2]", "[0, -1]",
+                                                "[0, -1, -1]", "[0, nan, nan]", "False"});
   CHECK(peer.closed >= 1);
   peer.reachable = false;
   robot.texts.clear();
