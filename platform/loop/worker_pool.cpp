@@ -42,14 +42,13 @@ void WorkerPool::parallel_for(int count, Body body) {
     const std::scoped_lock lock(mutex_);
     loop_ = &loop;
     ++loop_number_;
-    helpers_busy_ = workers_ - 1;
   }
   changed_.notify_all();
   work(loop, 0);
   {
     std::unique_lock lock(mutex_);
+    loop_ = nullptr;  // who has not woken up yet is not waited for: an idle computer can take milliseconds
     changed_.wait(lock, [&] { return helpers_busy_ == 0; });
-    loop_ = nullptr;
   }
   if (loop.error) std::rethrow_exception(loop.error);
 }
@@ -59,10 +58,11 @@ void WorkerPool::serve(int worker) {
   std::uint64_t done = 0;
   std::unique_lock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [&] { return ending_ || loop_number_ != done; });
+    changed_.wait(lock, [&] { return ending_ || (loop_ != nullptr && loop_number_ != done); });
     if (ending_) return;
     done = loop_number_;
     Loop& loop = *loop_;
+    ++helpers_busy_;
     lock.unlock();
     {
       const memory::ContextScope as_caller(loop.context);
