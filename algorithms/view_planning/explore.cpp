@@ -19,7 +19,7 @@ constexpr std::uint64_t kStream = 4500;  // of random numbers; + one for each ca
 constexpr double kTargetMargin_m = 0.005;
 constexpr std::uint64_t kRefineStream = 4600ULL << 40;
 constexpr std::uint64_t kEyesStream = 4700ULL << 40;
-constexpr int kEyesDrawn = 4096, kEyesAtOnce = 256;
+constexpr int kEyesDrawn = 8192, kEyesAtOnce = 256;
 constexpr double kRefinedMargin_m = 0.015;  // steps lead towards what hides the rest, and a look there finds more of it
 constexpr double kAside_rad = 0.12;         // standard deviation of each joint in a step of refinement
 constexpr double kBackMax = 0.4;            // of the way to where the arm is, in every other step
@@ -120,9 +120,9 @@ JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
 void ViewChooser::find_eyes(const Task& task, RunParallel run_parallel) {
   const ViewContext& c = task.context;
   eyes_m_.resize(kEyesDrawn);
+  const std::uint64_t block = (static_cast<std::uint64_t>(task.options.step) << 1) | (task.certificate ? 1U : 0U);
   run_parallel(kEyesDrawn / kEyesAtOnce, [&](int part, int) {
-    Random random(task.options.seed, kEyesStream + (static_cast<std::uint64_t>(task.options.step) << 10) +
-                                         static_cast<std::uint64_t>(part));
+    Random random(task.options.seed, kEyesStream + (block << 10) + static_cast<std::uint64_t>(part));
     for (int i = 0; i < kEyesAtOnce; ++i) {
       const LinkFrames frames = forward(c.arm, draw_random(task, random));
       Eigen::Vector3d& eye_m = eyes_m_[static_cast<std::size_t>(part * kEyesAtOnce + i)];
@@ -460,10 +460,10 @@ Result<ViewChoice> ViewChooser::search(const ViewContext& context, const JointVe
             .certificate = false,
             .samples = candidates_max_,
             .kept = static_cast<int>(kept_.size())};
-  find_eyes(task, run_parallel);
   for (const bool certificate : {false, true}) {
     task.certificate = certificate;
     if (certificate) task.samples = options.certificate_samples, task.kept = 0;
+    find_eyes(task, run_parallel);
     score(task, run_parallel);
     refine(task, run_parallel);
     for (int i = 0; i < task.candidates(); ++i) {
