@@ -25,7 +25,8 @@ struct StreamCounters {
   std::uint64_t lost = 0;
 };
 
-/// What both kinds of camera have in common. poll and next_due from the loop thread; they never block or allocate.
+/// What both kinds of camera have in common. poll and next_due from the loop thread; they never block or allocate. A
+/// device holds its last frames (32; large pictures 6 at least); reading an older one gives kFrameGone.
 class FrameStream {
  public:
   virtual ~FrameStream() = default;
@@ -33,7 +34,6 @@ class FrameStream {
   /// The newest frame with stamp <= now that was not yet taken. Empty when none came since the last call.
   [[nodiscard]] virtual std::optional<Frame> poll(Instant now) = 0;
   [[nodiscard]] virtual Instant next_due() const = 0;
-  /// A device holds its last frames (32; large pictures 6 at least); an older one gives kFrameGone.
   [[nodiscard]] virtual StreamCounters counters() const = 0;
 };
 
