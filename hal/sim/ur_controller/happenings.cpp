@@ -27,7 +27,7 @@ constexpr Row kRows[] = {
     {"pause", false, kNone, kNone, "Pause", [](SimulatedUr& r, double) { static_cast<void>(r.programs().pause()); }},
     {"stop", false, kNone, kNone, "Stop", [](SimulatedUr& r, double) { static_cast<void>(r.programs().stop()); }},
     {"answer", false, kNone, kNone, "somebody fills in the dialog in which a program asks: True, 5, 2.5 or a text",
-     nullptr, [](SimulatedUr& r, std::string_view text) { r.controller().requests().enter(text); }},
+     nullptr, [](SimulatedUr& r, std::string_view text) { return r.controller().requests().enter(text); }},
     {"slider", true, 0, 1, "the speed slider is set, 0 to 1",
      [](SimulatedUr& r, double fraction) { r.controller().set_speed_slider(fraction); }},
     {"emergency-stop", false, kNone, kNone, "the button on the pendant: the power is off",
@@ -126,9 +126,9 @@ Result<Happening> read_happening(std::string_view words) {
                  "'{}' is nothing that can happen to a robot; `firstlook ur-sim --at help` tells what is", words);
 }
 
-void happen(const Happening& happening, SimulatedUr& robot) {
+bool happen(const Happening& happening, SimulatedUr& robot) {
   if (happening.act != nullptr) happening.act(robot, happening.value);
-  if (happening.enter != nullptr) happening.enter(robot, happening.text);
+  return happening.enter == nullptr || happening.enter(robot, happening.text);
 }
 
 std::string happenings_in_words() {

@@ -16,7 +16,7 @@ namespace firstlook::sim::ur {
 /// One of the things that happen; read from its words.
 struct Happening {
   using Do = void (*)(SimulatedUr&, double);
-  using Enter = void (*)(SimulatedUr&, std::string_view);
+  using Enter = bool (*)(SimulatedUr&, std::string_view);
   Do act = nullptr;
   double value = 0;  ///< of those that take one
   Enter enter = nullptr;
@@ -25,7 +25,8 @@ struct Happening {
 
 /// "emergency-stop", "slider=0.5", ... Error: kUsage, with the words that there are.
 [[nodiscard]] Result<Happening> read_happening(std::string_view words);
-void happen(const Happening& happening, SimulatedUr& robot);
+/// False when nobody asked for the text.
+bool happen(const Happening& happening, SimulatedUr& robot);
 /// All words with what they do, a line each.
 [[nodiscard]] std::string happenings_in_words();
 

@@ -16,8 +16,7 @@ std::string answer_happening(std::string_view line, SimulatedUr& robot) {
   }
   const auto happening = read_happening(line);
   if (!happening) return std::string(happening.error().detail());
-  happen(*happening, robot);
-  return "done";
+  return happen(*happening, robot) ? "done" : "no dialog is open that takes this";
 }
 
 HappeningsSession::HappeningsSession(SimulatedUr& robot) : robot_(robot) {

@@ -19,6 +19,7 @@ void InterpreterSession::receive(std::string_view bytes) {
   std::size_t at = 0;
   for (std::size_t end = received_.find('\n'); end != std::string::npos; end = received_.find('\n', at)) {
     const std::string_view line = trimmed(std::string_view(received_).substr(at, end - at));
+    if (line.size() > kLineMax) return this->end();
     if (!line.empty()) programs_.interpret(line, answers_);
     at = end + 1;
   }

@@ -7,6 +7,7 @@ namespace {
 
 constexpr std::size_t kWaitingMax = 8500;  // as many as a program holds
 constexpr std::size_t kWaitingBytesMax = 1 << 20;
+constexpr int kAtOnce = 100;  // lines that one cycle compiles: clients of other ports wait meanwhile
 
 // The reasons, as clients of real controllers look for them.
 constexpr std::string_view kNotRunning = "Program is in an invalid state";
@@ -64,7 +65,7 @@ void StatementQueue::receive(std::string_view line, const Mailbox& to, script::M
 void StatementQueue::step(script::Machine* program) {
   if (program == nullptr) return discard_all(kNotRunning);
   if (program->interpreter().take_clear_queue()) discard_all(kCleared);
-  while (!waiting_.empty() && program->interpreter().takes()) {
+  for (int i = 0; i < kAtOnce && !waiting_.empty() && program->interpreter().takes(); ++i) {
     interpret(waiting_.front(), *program);
     waiting_bytes_ -= waiting_.front().text.size();
     waiting_.pop_front();

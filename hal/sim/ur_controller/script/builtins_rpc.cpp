@@ -13,12 +13,12 @@ constexpr double kConnect_s = 2;
 using SocketState = Sockets::State;
 
 /// One call at a time and thread has a connection. The machine closes what a program leaves open.
-std::uint64_t& connection(Call& c) { return c.machine().socket(fmt::format("xmlrpc of thread {}", c.thread().number)); }
+std::string connection_name(Call& c) { return fmt::format("xmlrpc of thread {}", c.thread().number); }
+std::uint64_t& connection(Call& c) { return c.machine().socket(connection_name(c)); }
 
 void hang_up(Call& c) {
-  std::uint64_t& socket = connection(c);
-  if (socket != 0) c.machine().sockets()->close(socket);
-  socket = 0;
+  if (const std::uint64_t socket = connection(c); socket != 0) c.machine().sockets()->close(socket);
+  c.machine().forget_socket(connection_name(c));
 }
 
 void fail(Call& c, std::string_view url, std::string_view why) {

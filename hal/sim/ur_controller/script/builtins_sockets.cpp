@@ -32,8 +32,8 @@ void socket_open(Call& c) {
   if (c.machine().sockets() == nullptr) return c.answer(false);
   std::uint64_t& socket = c.machine().socket(name);
   if (c.state().first) {
-    if (c.machine().socket_count() > kSocketsMax) return c.fail("Too many sockets");
     close_named(c, name);
+    if (c.machine().open_sockets() >= kSocketsMax) return c.fail("Too many sockets");
     socket = c.machine().sockets()->open(host, static_cast<std::uint16_t>(port));
   }
   const auto state = socket != 0 ? c.machine().sockets()->state(socket) : Sockets::State::kClosed;

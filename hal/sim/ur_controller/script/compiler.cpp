@@ -63,8 +63,8 @@ class Compiler {
     line.function = body("", enclosing_locals);
     code_.functions[static_cast<std::size_t>(line.function)].locals.clear();  // it brings none of its own
     line.clears = clears_;
-    keep_function_numbers();
     if (error_) return std::unexpected(*error_);
+    keep_function_numbers();
     return line;
   }
 
@@ -770,20 +770,29 @@ CodeMark mark_of(const Code& code) {
   return {code.functions.size(), code.constants.size(), code.globals.size(), code.function_numbers};
 }
 
+namespace {
+
+/// But for the names of functions.
+void shorten(Code& code, std::size_t functions, std::size_t constants, std::size_t globals) {
+  for (std::size_t i = globals; i < code.globals.size(); ++i) code.global_numbers.erase(code.globals[i]);
+  code.functions.resize(functions);
+  code.constants.resize(constants);
+  code.globals.resize(globals);
+}
+
+}  // namespace
+
 void take_back(Code& code, const CodeMark& mark) {
-  for (std::size_t i = mark.globals; i < code.globals.size(); ++i) code.global_numbers.erase(code.globals[i]);
-  code.functions.resize(mark.functions);
-  code.constants.resize(mark.constants);
-  code.globals.resize(mark.globals);
+  shorten(code, mark.functions, mark.constants, mark.globals);
   code.function_numbers = mark.function_numbers;
 }
 
 std::expected<StatementLine, ScriptError> compile_statements(std::string_view line, Code& code, int scope) {
   auto tokens = tokenize(line);
   if (!tokens) return std::unexpected(tokens.error());
-  const CodeMark mark = mark_of(code);
+  const std::size_t functions = code.functions.size(), constants = code.constants.size(), globals = code.globals.size();
   auto compiled = Compiler(line, std::move(*tokens), code).statements(scope);
-  if (!compiled) take_back(code, mark);
+  if (!compiled) shorten(code, functions, constants, globals);
   return compiled;
 }
 

@@ -81,17 +81,22 @@ std::string http_post(const HttpUrl& url, std::string_view xml) {
 }
 
 std::expected<std::optional<std::string>, std::string> read_http_answer(std::string_view received, bool ended) {
+  constexpr std::size_t kContinue = 100;  // "more will come"
   if (received.size() > kAnswerBytesMax) return std::unexpected("its answer is too long");
-  const std::size_t head_end = received.find("\r\n\r\n");
-  if (head_end == std::string_view::npos) {
-    if (ended) return std::unexpected("the connection ended without an answer");
-    return std::nullopt;
+  std::string_view head;
+  std::size_t head_end = 0;
+  std::optional<std::size_t> status = kContinue;
+  while (*status == kContinue) {
+    if (!head.empty()) received.remove_prefix(head_end + 4);
+    head_end = received.find("\r\n\r\n");
+    if (head_end == std::string_view::npos) {
+      if (ended) return std::unexpected("the connection ended without an answer");
+      return std::nullopt;
+    }
+    head = received.substr(0, head_end);
+    status = number_of(head.substr(std::min(head.find(' '), head.size())), 10);
+    if (!head.starts_with("HTTP/") || !status) return std::unexpected("its answer is not HTTP");
   }
-  const std::string_view head = received.substr(0, head_end);
-  const std::size_t blank = std::min(head.find(' '), head.size());
-  const auto status = number_of(head.substr(blank), 10);
-  if (!head.starts_with("HTTP/") || !status) return std::unexpected("its answer is not HTTP");
-  if (*status == 100) return read_http_answer(received.substr(head_end + 4), ended);
   if (*status != 200) return std::unexpected(fmt::format("HTTP status {}", *status));
   const std::string_view body = received.substr(head_end + 4);
   std::expected<std::optional<std::string>, std::string> content = std::nullopt;

@@ -18,8 +18,8 @@ void InterpreterMode::enter(int scope, bool clear_queue, bool clear_on_end, cons
   clear_on_end_ = clear_on_end;
   clear_queue_ = clear_queue;
   scope_ = scope;
-  taken_ = 0;
-  taken_bytes_ = 0;
+  kept_ += std::exchange(taken_, 0);
+  kept_bytes_ += std::exchange(taken_bytes_, 0);
   before_ = mark_of(code);
 }
 
@@ -50,7 +50,9 @@ std::optional<int> InterpreterMode::begin_next() {
   return next.function;
 }
 
-bool InterpreterMode::full() const { return taken_ >= kStatementsMax || taken_bytes_ >= kStatementBytesMax; }
+bool InterpreterMode::full() const {
+  return kept_ + taken_ >= kStatementsMax || kept_bytes_ + taken_bytes_ >= kStatementBytesMax;
+}
 
 std::expected<int, ScriptError> InterpreterMode::add(std::string_view line, Code& code) {
   const auto compiled = compile_statements(line, code, scope_);

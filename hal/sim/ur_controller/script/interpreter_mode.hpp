@@ -64,6 +64,8 @@ class InterpreterMode {
   int scope_ = 0;
   int taken_ = 0;  ///< since it was entered or cleared
   std::size_t taken_bytes_ = 0;
+  int kept_ = 0;  ///< from earlier modes of the program, which left them in it
+  std::size_t kept_bytes_ = 0;
   CodeMark before_;
   std::deque<Statement> waiting_;
   StatementIds ids_;

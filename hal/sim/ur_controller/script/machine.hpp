@@ -1,6 +1,7 @@
 /// Runs a compiled script, one control cycle at a time, within bounds on steps and memory.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -72,7 +73,11 @@ class Machine {
   void halt() { end_ = End::kHalted; }
   /// The socket of that name, 0 if there is none.
   [[nodiscard]] std::uint64_t& socket(const std::string& name) { return socket_names_[name]; }
-  [[nodiscard]] std::size_t socket_count() const { return socket_names_.size(); }
+  void forget_socket(const std::string& name) { socket_names_.erase(name); }
+  [[nodiscard]] std::size_t open_sockets() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(socket_names_, [](const auto& entry) { return entry.second != 0; }));
+  }
   /// False when another thread moves the arm. `line` 0 lets it go.
   [[nodiscard]] bool take_arm(const Thread& thread);
   void release_arm(const Thread& thread);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <type_traits>
 
 namespace firstlook::sim::ur::script {
 namespace {
@@ -153,16 +154,19 @@ class Reader {
   Value number() {
     const std::string digits = text();
     const char* begin = digits.data();
+    const char* const end = begin + digits.size();
     if (!digits.empty() && digits.front() == '+') ++begin;
     Number number{};
-    if (std::from_chars(begin, digits.data() + digits.size(), number).ec != std::errc{}) ok_ = false;
-    return number;
+    const auto [read_to, error] = std::from_chars(begin, end, number);
+    if (error != std::errc{} || read_to != end || !std::isfinite(static_cast<double>(number))) ok_ = false;
+    return static_cast<std::conditional_t<std::is_integral_v<Number>, std::int64_t, double>>(number);
   }
 
   Answer content(int nesting) {
-    for (const std::string_view name : {"i4", "int", "i8"}) {
-      if (opens(name)) return closed(number<std::int64_t>(), name);
+    for (const std::string_view name : {"i4", "int"}) {
+      if (opens(name)) return closed(number<std::int32_t>(), name);
     }
+    if (opens("i8")) return closed(number<std::int64_t>(), "i8");
     if (opens("double")) return closed(number<double>(), "double");
     if (opens("boolean")) return closed(text() == "1", "boolean");
     if (opens("string")) return closed(text(), "string");

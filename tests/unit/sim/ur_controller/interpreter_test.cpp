@@ -339,6 +339,30 @@ TEST_CASE("an interpreter holds so many statements until it is cleared", "[ur][i
   CHECK(robot.id("x = 2") == 8502);
 }
 
+TEST_CASE("statements that an earlier mode left in the program count, too", "[ur][interpreter]") {
+  Interpreted robot("def prog():\n  while True:\n    interpreter_mode(True, False)\n  end\nend\n");
+  std::string many;
+  for (int i = 0; i < 8497; ++i) many += "x = 1\n";
+  robot.port.receive(many + "end_interpreter()\n");
+  robot.run(0.2);
+  CHECK(robot.id("x = 2") == 8499);
+  CHECK(robot.id("clear_interpreter()") == 8500);  // of this mode alone
+  CHECK(robot.id("x = 2") == 8501);
+  CHECK(robot.id("end_interpreter()") == 8502);
+  CHECK(robot.ask("x = 3") == "discard: Too many interpreted messages: x = 3");
+}
+
+TEST_CASE("thousands of lines that wait leave other clients their turn", "[ur][interpreter]") {
+  Interpreted robot("def prog():\n  sleep(1)\n  interpreter_mode(False)\nend\n");
+  for (int i = 0; i < 3000; ++i) robot.port.receive("x = 1\n");
+  for (int cycle = 0; cycle < 1000 && robot.port.output().empty(); ++cycle) robot.run(0.002);
+  const std::string first = robot.port.output();
+  CHECK_FALSE(first.empty());
+  CHECK(std::count(first.begin(), first.end(), '\n') <= 100);
+  robot.run(0.2);
+  CHECK_THAT(robot.port.output(), Contains("ack: 3000: x = 1\n"));
+}
+
 TEST_CASE("a line for the interpreter without an end does not grow for ever", "[ur][interpreter]") {
   Interpreted robot;
   robot.port.receive(std::string(100'000, 'x'));

@@ -113,8 +113,10 @@ TEST_CASE("dialogs of several threads are filled in one after the other", "[ur][
       "def prog():\n  thread other():\n    textmsg(\"other \", request_integer_from_primary_client(\"other\"))\n  end\n"
       "  t = run other()\n  textmsg(\"main \", request_integer_from_primary_client(\"main\"))\n  join t\nend\n",
       0.1);
-  happen(*read_happening("answer=1"), robot.robot);
-  happen(*read_happening("answer=2"), robot.robot);
+  CHECK_FALSE(happen(*read_happening("answer=one"), robot.robot));
+  CHECK(happen(*read_happening("answer=1"), robot.robot));
+  CHECK(happen(*read_happening("answer=2"), robot.robot));
+  CHECK_FALSE(happen(*read_happening("answer=3"), robot.robot));
   robot.listen(0.1);
   CHECK(robot.texts == std::vector<std::string>{"main 1", "other 2"});
 }

@@ -587,6 +587,26 @@ class FakePeer final : public script::Sockets {
 
 }  // namespace
 
+TEST_CASE("sockets that were closed leave room for others", "[ur][script]") {
+  FakePeer peer;
+  ScriptRobot robot;
+  robot.robot.programs().set_sockets(&peer);
+  const auto open_so_many = [&](const std::string& then) {
+    robot.send(
+        "def prog():\n  i = 0\n  while i < 17:\n    name = str_cat(\"s\", i)\n    socket_open(\"10.0.0.2\", 1, "
+        "name)\n" +
+            then + "    i = i + 1\n  end\n  textmsg(\"done\")\nend\n",
+        0.5);
+  };
+  open_so_many("    socket_close(name)\n");
+  CHECK(robot.texts == std::vector<std::string>{"done"});
+  CHECK(robot.exceptions.empty());
+  open_so_many("");
+  REQUIRE(robot.exceptions.size() == 1);
+  CHECK_THAT(robot.exceptions.front().text, Contains("Too many sockets"));
+  robot.robot.programs().set_sockets(nullptr);
+}
+
 TEST_CASE("flags outlive the program that set them", "[ur][script]") {
   ScriptRobot robot;
   robot.send("def one():\n  set_flag(31, True)\n  set_flag(3, get_flag(31))\n  set_flag(31, False)\nend\n", 0.1);

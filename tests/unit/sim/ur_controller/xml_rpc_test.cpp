@@ -163,6 +163,7 @@ TEST_CASE("a program that is stopped within a call hangs up", "[ur][script]") {
 
 TEST_CASE("answers of XML-RPC as values", "[ur][script]") {
   CHECK(script::text_of(read("<value><int>-5</int></value>")) == "-5");
+  CHECK(script::text_of(read("<value><i8>99999999999</i8></value>")) == "99999999999");
   CHECK(script::text_of(read("<value><i4>+7</i4></value>")) == "7");
   CHECK(script::text_of(read("<value><double>-0.25</double></value>")) == "-0.25");
   CHECK(script::text_of(read("<value><boolean>1</boolean></value>")) == "True");
@@ -174,7 +175,9 @@ TEST_CASE("answers of XML-RPC as values", "[ur][script]") {
                              "<!-- a note --></data></array></value>")) == "[1, []]");
   CHECK(script::read_xml_rpc_answer("<methodResponse><params></params></methodResponse>")->empty());
   for (const char* wrong :
-       {"", "<value>", "<value><int>x</int></value>", "<value><int>1</double></value>", "<value><date>1</date></value>",
+       {"", "<value>", "<value><int>x</int></value>", "<value><int>1</double></value>",
+        "<value><int>12abc</int></value>", "<value><i4>99999999999</i4></value>", "<value><double>nan</double></value>",
+        "<value><double>inf</double></value>", "<value><date>1</date></value>",
         "<value><struct><member><name>a</name><value>1</value></member></struct></value>", "<value><array></value>"}) {
     INFO(wrong);
     CHECK_FALSE(script::read_xml_rpc_answer(answer_of(wrong)));
@@ -201,6 +204,9 @@ TEST_CASE("HTTP addresses and answers", "[ur][script]") {
   CHECK_FALSE(read_http_answer("HTTP/1.0 200 OK\r\n\r\nall of", false)->has_value());
   CHECK(read_http_answer("HTTP/1.0 200 OK\r\n\r\nall of it", true)->value() == "all of it");
   CHECK(read_http_answer("HTTP/1.1 100 Continue\r\n\r\n" + http("x"), false)->value() == "x");
+  std::string patient;
+  for (int i = 0; i < 50'000; ++i) patient += "HTTP/1.1 100 \r\n\r\n";
+  CHECK(read_http_answer(patient + http("x"), false)->value() == "x");
   CHECK_FALSE(read_http_answer("", true));
   CHECK_FALSE(read_http_answer("no HTTP\r\n\r\n", false));
   const std::string whole = http("short");
