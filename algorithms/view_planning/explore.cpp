@@ -61,6 +61,11 @@ bool is_seen_from(const VoxelMap& map, const Eigen::Vector3d& eye, std::uint32_t
   return seen;
 }
 
+/// Of random streams: each choice has one, and its certificate another.
+std::uint64_t block_of(std::uint32_t step, bool certificate) {
+  return (std::uint64_t{step} << 1) | (certificate ? 1U : 0U);
+}
+
 double largest_joint_distance(const JointVector& a, const JointVector& b) { return (a - b).max_abs(); }
 
 }  // namespace
@@ -120,7 +125,7 @@ JointVector ViewChooser::draw_nearby(const Task& task, Random& random) const {
 void ViewChooser::find_eyes(const Task& task, RunParallel run_parallel) {
   const ViewContext& c = task.context;
   eyes_m_.resize(kEyesDrawn);
-  const std::uint64_t block = (static_cast<std::uint64_t>(task.options.step) << 1) | (task.certificate ? 1U : 0U);
+  const std::uint64_t block = block_of(task.options.step, task.certificate);
   run_parallel(kEyesDrawn / kEyesAtOnce, [&](int part, int) {
     Random random(task.options.seed, kEyesStream + (block << 10) + static_cast<std::uint64_t>(part));
     for (int i = 0; i < kEyesAtOnce; ++i) {
@@ -169,7 +174,7 @@ bool ViewChooser::draw_aimed(const Task& task, int index, Random& random, JointV
 
 void ViewChooser::find_candidate(const Task& task, int index, Candidate& out) const {
   const ViewContext& c = task.context;
-  const std::uint64_t block = (static_cast<std::uint64_t>(task.options.step) << 1) | (task.certificate ? 1U : 0U);
+  const std::uint64_t block = block_of(task.options.step, task.certificate);
   Random random(task.options.seed, kStream + (block << 20) + static_cast<std::uint64_t>(index));
   // They take turns: random, nearby, aimed.
   const int source = index % kSources;

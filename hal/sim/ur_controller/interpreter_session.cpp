@@ -1,16 +1,11 @@
 #include "hal/sim/ur_controller/interpreter_session.hpp"
 
+#include "hal/sim/ur_controller/script_feed.hpp"
+
 namespace firstlook::sim::ur {
 namespace {
 
 constexpr std::size_t kLineMax = 1 << 16;
-
-std::string_view trimmed(std::string_view line) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t begin = line.find_first_not_of(kBlank);
-  if (begin == std::string_view::npos) return {};
-  return line.substr(begin, line.find_last_not_of(kBlank) - begin + 1);
-}
 
 }  // namespace
 

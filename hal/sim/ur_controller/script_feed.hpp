@@ -10,6 +10,9 @@ namespace firstlook::sim::ur {
 
 inline constexpr std::size_t kScriptBytesMax = 1 << 20;
 
+/// Without the blanks at its ends.
+[[nodiscard]] std::string_view trimmed(std::string_view line);
+
 class ScriptFeed {
  public:
   void add(std::string_view bytes) { received_.append(bytes); }
