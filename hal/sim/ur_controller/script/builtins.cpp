@@ -13,8 +13,9 @@ namespace {
 const std::vector<Builtin>& all() {
   static const std::vector<Builtin> builtins = [] {
     std::vector<Builtin> rows;
-    for (const auto table : {math_builtins(), text_builtins(), motion_builtins(), robot_builtins(), io_builtins(),
-                             socket_builtins(), interpreter_builtins(), pendant_builtins(), rpc_builtins()}) {
+    for (const auto table :
+         {math_builtins(), text_builtins(), motion_builtins(), robot_builtins(), io_builtins(), socket_builtins(),
+          interpreter_builtins(), pendant_builtins(), rpc_builtins(), object_builtins()}) {
       rows.insert(rows.end(), table.begin(), table.end());
     }
     std::ranges::stable_sort(rows, {}, &Builtin::name);

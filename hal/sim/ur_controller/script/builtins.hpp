@@ -75,6 +75,10 @@ struct Builtin {
 [[nodiscard]] std::span<const Builtin> interpreter_builtins();
 [[nodiscard]] std::span<const Builtin> pendant_builtins();
 [[nodiscard]] std::span<const Builtin> rpc_builtins();
+[[nodiscard]] std::span<const Builtin> object_builtins();
+
+/// A function of another computer; takes its time, as builtins do.
+void call_remote(Call& call, const RpcHandle& rpc, const std::string& method, std::span<const Value> arguments);
 
 struct Parameter {
   std::string name;

@@ -49,37 +49,31 @@ void rpc_factory(Call& c) {
   c.answer(rpc);
 }
 
-/// handle.method(...): handle, method, arguments.
-void call_method(Call& c) {
-  const RpcHandle* rpc = c.value(0).as<RpcHandle>();
-  const std::string method = c.text(1);
-  if (rpc == nullptr) return c.fail_type(0, "what rpc_factory gives");
+constexpr Builtin kTable[] = {
+    {"rpc_factory", "type,url", rpc_factory},
+};
+
+}  // namespace
+
+void call_remote(Call& c, const RpcHandle& rpc, const std::string& method, std::span<const Value> arguments) {
   if (method == "closeXMLRPCClientConnection") return;  // each call has a connection of its own
   if (c.state().phase == 0) {
-    if (!connected(c, *rpc)) return;
-    const auto call = xml_rpc_call(method, c.values().subspan(2));
-    if (!call) return fail(c, rpc->url, call.error());
-    static_cast<void>(c.machine().sockets()->send(connection(c), http_post(*read_http_url(rpc->url), *call)));
+    if (!connected(c, rpc)) return;
+    const auto call = xml_rpc_call(method, arguments);
+    if (!call) return fail(c, rpc.url, call.error());
+    static_cast<void>(c.machine().sockets()->send(connection(c), http_post(*read_http_url(rpc.url), *call)));
     c.state().phase = 1;
   }
   const std::uint64_t socket = connection(c);
   const bool ended = c.machine().sockets()->state(socket) != SocketState::kOpen;
   const auto answer = read_http_answer(c.machine().sockets()->received(socket), ended);
-  if (!answer) return fail(c, rpc->url, answer.error());
+  if (!answer) return fail(c, rpc.url, answer.error());
   if (!*answer) return c.wait();
   hang_up(c);
   auto value = read_xml_rpc_answer(**answer);
-  if (!value) return fail(c, rpc->url, fmt::format("{}: {}", method, value.error()));
+  if (!value) return fail(c, rpc.url, fmt::format("{}: {}", method, value.error()));
   c.answer(std::move(*value));
 }
-
-/// "." is no name that a script could call: a method is compiled to it.
-constexpr Builtin kTable[] = {
-    {".", "", call_method},
-    {"rpc_factory", "type,url", rpc_factory},
-};
-
-}  // namespace
 
 std::span<const Builtin> rpc_builtins() { return kTable; }
 

@@ -16,8 +16,9 @@ enum class Op : std::uint8_t {
   kStoreLocal,   ///< pop into local a
   kLoadGlobal,   ///< push global a
   kStoreGlobal,  ///< pop into global a
-  kIndex,        ///< container, index -> element
+  kIndex,        ///< container, a indices -> element; a member is the index of its name
   kSetElement,   ///< container, a indices, value -> container with the element replaced
+  kUnpack,       ///< list of two -> the second, the first
   kNegate,
   kNot,
   kBinary,           ///< a: a BinaryOp

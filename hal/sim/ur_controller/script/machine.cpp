@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
 #include "hal/sim/ur_controller/script/operations.hpp"
@@ -13,7 +14,7 @@ namespace {
 constexpr int kStepsMax = 5000;   // of one thread in one cycle
 constexpr double kBusyMax_s = 2;  // without ever waiting: then the controller says that it is too much behind
 constexpr std::uint64_t kMadeMax = 200'000;  // weight of values, of one thread in one cycle
-constexpr std::uint64_t kHeldMax = 500'000;  // of the whole program; some 50 bytes each
+constexpr std::uint64_t kHeldMax = 500'000;  // of the whole program; some 70 bytes each
 constexpr std::size_t kFramesMax = 200;
 constexpr std::size_t kStackMax = 10'000;
 constexpr std::size_t kThreadsMax = 64;
@@ -295,13 +296,14 @@ bool Machine::execute(Thread& thread) {
     case Op::kStoreGlobal: {
       Value value = pop(thread);
       if (value.empty()) return fail(instruction, "Type error: a function without a value is assigned"), false;
-      (instruction.op == Op::kStoreLocal ? stack[frame.base + a] : globals_[a]) = std::move(value);
+      Value& variable = instruction.op == Op::kStoreLocal ? stack[frame.base + a] : globals_[a];
+      variable = assigned(variable, std::move(value));
       return true;
     }
     case Op::kIndex: {
-      const Value index = pop(thread);
-      const Value container = pop(thread);
-      return put(element_of(container, index));
+      Computed element = element_of(stack[stack.size() - 1 - a], std::span<const Value>(stack).last(a));
+      stack.resize(stack.size() - 1 - a);
+      return put(std::move(element));
     }
     case Op::kSetElement: {
       const Value element = pop(thread);
@@ -309,6 +311,12 @@ bool Machine::execute(Thread& thread) {
       stack.resize(stack.size() - a);
       Value container = pop(thread);
       return put(with_element(std::move(container), path, element));
+    }
+    case Op::kUnpack: {
+      const Value pair = pop(thread);
+      const List& values = *pair.as<List>();
+      stack.insert(stack.end(), {values[1], values[0]});
+      return true;
     }
     case Op::kNegate:
       return put(negate(pop(thread)));

@@ -1,5 +1,7 @@
 #include "hal/sim/ur_controller/script/names.hpp"
 
+#include "hal/sim/ur_controller/script/list_methods.hpp"
+
 namespace firstlook::sim::ur::script {
 namespace {
 
@@ -27,16 +29,31 @@ std::vector<std::string> parameters_at(const std::vector<Token>& tokens, std::si
 
 }  // namespace
 
-bool assigns(const std::vector<Token>& tokens, std::size_t i) {
+std::size_t end_of_place(const std::vector<Token>& tokens, std::size_t i) {
+  const auto is = [&](std::size_t at, std::string_view symbol) { return at < tokens.size() && tokens[at].is(symbol); };
   std::size_t j = i + 1;
-  while (j < tokens.size() && tokens[j].is("[")) {
+  while (is(j, "[") || (is(j, ".") && tokens[j + 1].kind == Kind::kName && !is(j + 2, "("))) {
+    if (is(j, ".")) {
+      j += 2;
+      continue;
+    }
     int open = 0;
     do {
-      open += tokens[j].is("[") ? 1 : tokens[j].is("]") ? -1 : 0;
+      open += is(j, "[") ? 1 : is(j, "]") ? -1 : 0;
       ++j;
     } while (j < tokens.size() && open > 0);
   }
-  return j < tokens.size() && tokens[j].is("=");
+  return j;
+}
+
+bool assigns(const std::vector<Token>& tokens, std::size_t i) {
+  const std::size_t j = end_of_place(tokens, i);
+  return j < tokens.size() && tokens[j].is("=") && !(i > 0 && tokens[i - 1].is("."));
+}
+
+bool changes_list(const std::vector<Token>& tokens, std::size_t i) {
+  const std::size_t j = end_of_place(tokens, i);
+  return j + 2 < tokens.size() && tokens[j].is(".") && is_changing_method(tokens[j + 1].text) && tokens[j + 2].is("(");
 }
 
 bool sets_signal(const std::vector<Token>& tokens, std::size_t i) {
@@ -66,7 +83,7 @@ Names find_names(const std::vector<Token>& tokens, std::size_t program) {
       blocks.pop_back();
     } else if (token.is("global")) {
       names.declared.push_back(tokens[i + 1]);
-    } else if (functions == body && assigns(tokens, i) && !sets_signal(tokens, i) &&
+    } else if (functions == body && tokens[i + 1].is("=") && assigns(tokens, i) &&
                !(i > 0 && tokens[i - 1].is("local"))) {
       names.assigned.push_back(token.text);
     }

@@ -20,7 +20,11 @@ struct Names {
 /// Of statements for a program that runs.
 [[nodiscard]] Names find_statement_names(const std::vector<Token>& tokens);
 
-/// An assignment begins at this token: a name, perhaps indices, and "=".
+/// Beyond a name with its indices and members, a[2].b: the token that follows.
+[[nodiscard]] std::size_t end_of_place(const std::vector<Token>& tokens, std::size_t i);
+/// "a[2].append(": a method that changes the list that stands there, and with it the variable.
+[[nodiscard]] bool changes_list(const std::vector<Token>& tokens, std::size_t i);
+/// An assignment begins at this token: a name, perhaps indices and members, and "=".
 [[nodiscard]] bool assigns(const std::vector<Token>& tokens, std::size_t i);
 /// "digital_out[2] = ...": an output by its old name, not a list of the program's.
 [[nodiscard]] bool sets_signal(const std::vector<Token>& tokens, std::size_t i);

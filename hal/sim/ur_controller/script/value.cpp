@@ -27,17 +27,35 @@ void append(std::string& text, const Value& value) {
       append(text, element);
     }
     text += ']';
+  } else if (const auto* members = value.as<StructValue>()) {
+    text += "struct(";
+    for (std::size_t k = 0; k < members->names.size(); ++k) {
+      text += (k > 0 ? ", " : "") + members->names[k] + " = ";
+      append(text, members->values[k]);
+    }
+    text += ')';
   } else {
     text += value.empty() ? "None" : type_name(value);
   }
 }
 
+std::uint32_t weight_of(const List& list) {
+  std::uint64_t sum = 1;
+  for (const Value& element : list) sum += element.weight;
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, UINT32_MAX / 2));
+}
+
 }  // namespace
 
 Value::Value(List value) : content(std::move(value)) {
-  std::uint64_t sum = 1;
-  for (const Value& element : std::get<List>(content)) sum += element.weight;
-  weight = static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, UINT32_MAX));
+  const List& list = std::get<List>(content);
+  weight = weight_of(list);
+  capacity = static_cast<std::uint32_t>(list.size());
+}
+
+Value::Value(StructValue value) : content(std::move(value)) {
+  const auto& members = std::get<StructValue>(content);
+  weight = weight_of(members.values) + static_cast<std::uint32_t>(members.names.size());
 }
 
 double Value::number() const {
@@ -59,8 +77,13 @@ std::string text_of(const Value& value) {
 }
 
 std::string_view type_name(const Value& value) {
-  constexpr std::string_view kNames[] = {"none", "bool", "int", "float", "string", "list", "pose", "thread", "rpc"};
+  constexpr std::string_view kNames[] = {"none", "bool", "int",    "float", "string",
+                                         "list", "pose", "thread", "rpc",   "struct"};
   return kNames[value.content.index()];
+}
+
+bool alike(const Value& a, const Value& b) {
+  return (a.is_number() && b.is_number()) || a.content.index() == b.content.index();
 }
 
 bool equal(const Value& a, const Value& b) {
@@ -71,6 +94,10 @@ bool equal(const Value& a, const Value& b) {
   if (const auto* pose = a.as<PoseValue>()) return pose->pose == b.as<PoseValue>()->pose;
   if (const auto* thread = a.as<ThreadHandle>()) return thread->number == b.as<ThreadHandle>()->number;
   if (const auto* rpc = a.as<RpcHandle>()) return rpc->url == b.as<RpcHandle>()->url;
+  if (const auto* members = a.as<StructValue>()) {
+    const auto& others = *b.as<StructValue>();
+    return members->names == others.names && std::ranges::equal(members->values, others.values, equal);
+  }
   if (const auto* list = a.as<List>()) return std::ranges::equal(*list, *b.as<List>(), equal);
   return true;
 }

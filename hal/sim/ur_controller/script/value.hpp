@@ -23,14 +23,21 @@ struct ThreadHandle {
 struct RpcHandle {
   std::string url;
 };
+/// What `struct` makes: as many names as values, in the order in which they were given.
+struct StructValue {
+  std::vector<std::string> names;
+  List values;
+};
 
 inline constexpr std::uint32_t kWeightMax = 20'000;  // elements of a list with all its lists
 inline constexpr std::size_t kTextBytesMax = 64 * 1024;
 
 struct Value {
-  std::variant<std::monostate, bool, std::int64_t, double, std::string, List, PoseValue, ThreadHandle, RpcHandle>
+  std::variant<std::monostate, bool, std::int64_t, double, std::string, List, PoseValue, ThreadHandle, RpcHandle,
+               StructValue>
       content;
-  std::uint32_t weight = 1;  ///< of a list: 1 and what its elements weigh
+  std::uint32_t weight = 1;    ///< of a list: 1 and what its elements weigh
+  std::uint32_t capacity = 0;  ///< of a list: how many elements it may have
 
   Value() = default;
   Value(bool value) : content(value) {}          // NOLINT(google-explicit-constructor)
@@ -44,6 +51,7 @@ struct Value {
   Value(const PoseValue& value) : content(value), weight(6) {}      // NOLINT(google-explicit-constructor)
   Value(ThreadHandle value) : content(value) {}                     // NOLINT(google-explicit-constructor)
   Value(List value);                                                // NOLINT(google-explicit-constructor)
+  Value(StructValue value);                                         // NOLINT(google-explicit-constructor)
   Value(RpcHandle value) : content(std::move(value)), weight(8) {}  // NOLINT(google-explicit-constructor)
 
   template <typename T>
@@ -65,6 +73,8 @@ struct Value {
 [[nodiscard]] std::string text_of(const Value& value);
 /// "bool", "int", ... for errors.
 [[nodiscard]] std::string_view type_name(const Value& value);
+/// Of one type, or both numbers.
+[[nodiscard]] bool alike(const Value& a, const Value& b);
 /// Equal in URScript: numbers by value, lists and poses element by element, other types never with each other.
 [[nodiscard]] bool equal(const Value& a, const Value& b);
 

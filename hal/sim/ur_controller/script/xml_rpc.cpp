@@ -6,9 +6,10 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <type_traits>
+
+#include "hal/sim/ur_controller/script/operations.hpp"
 
 namespace firstlook::sim::ur::script {
 namespace {
@@ -57,18 +58,22 @@ bool write_value(std::string& xml, const Value& value) {
                          pose->pose[i]);
     }
     xml += "</struct>";
+  } else if (const auto* members = value.as<StructValue>()) {
+    xml += "<struct>";
+    for (std::size_t i = 0; i < members->names.size(); ++i) {
+      xml += "<member><name>";
+      write_text(xml, members->names[i]);
+      xml += "</name>";
+      if (!write_value(xml, members->values[i])) return false;
+      xml += "</member>";
+    }
+    xml += "</struct>";
   } else {
     return false;
   }
   xml += "</value>";
   return true;
 }
-
-/// What an answer holds: a URScript value, or a struct that is none.
-struct Answer {
-  Value value;
-  std::map<std::string, Value> members{};
-};
 
 /// Reads elements one after the other. What does not fit ends it: `ok()` is false from then on.
 class Reader {
@@ -86,15 +91,15 @@ class Reader {
     if (!tag(fmt::format("</{}>", name))) ok_ = false;
   }
 
-  Answer value(int nesting = 0) {
+  Value value(int nesting = 0) {
     open("value");
-    Answer answer = nesting < kNestingMax && ok_ ? content(nesting) : stop();
+    Value answer = nesting < kNestingMax && ok_ ? content(nesting) : stop();
     close("value");
     return answer;
   }
 
  private:
-  Answer stop() {
+  Value stop() {
     ok_ = false;
     return {};
   }
@@ -162,7 +167,7 @@ class Reader {
     return static_cast<std::conditional_t<std::is_integral_v<Number>, std::int64_t, double>>(number);
   }
 
-  Answer content(int nesting) {
+  Value content(int nesting) {
     for (const std::string_view name : {"i4", "int"}) {
       if (opens(name)) return closed(number<std::int32_t>(), name);
     }
@@ -170,47 +175,48 @@ class Reader {
     if (opens("double")) return closed(number<double>(), "double");
     if (opens("boolean")) return closed(text() == "1", "boolean");
     if (opens("string")) return closed(text(), "string");
-    if (tag("<string/>")) return {std::string()};
+    if (tag("<string/>")) return std::string();
     if (opens("array")) return array(nesting);
     if (opens("struct")) return structure(nesting);
     if (tag("<nil/>")) return {};
     const std::string untyped = text();
-    return rest_.starts_with("</value>") ? Answer{untyped} : stop();
+    return rest_.starts_with("</value>") ? Value(untyped) : stop();
   }
-  Answer closed(Value value, std::string_view name) {
+  Value closed(Value value, std::string_view name) {
     close(name);
-    return {std::move(value)};
+    return value;
   }
-  Answer array(int nesting) {
+  Value array(int nesting) {
     List list;
     if (!tag("<data/>")) {
       open("data");
       while (ok_ && !tag("</data>")) {
-        Answer element = value(nesting + 1);
-        if (!element.members.empty()) return stop();
-        list.push_back(std::move(element.value));
+        list.push_back(value(nesting + 1));
       }
     }
     close("array");
-    return {Value(std::move(list))};
+    return list;
   }
-  Answer structure(int nesting) {
-    Answer answer;
+  /// A pose, where it has just the members of one.
+  Value structure(int nesting) {
+    StructValue read;
     while (ok_ && !tag("</struct>")) {
       open("member");
       open("name");
-      const std::string name = text();
+      read.names.push_back(text());
       close("name");
-      answer.members[name] = value(nesting + 1).value;
+      read.values.push_back(value(nesting + 1));
       close("member");
     }
     PoseValue pose;
     for (std::size_t i = 0; i < kPoseMembers.size(); ++i) {
-      const auto member = answer.members.find(std::string(kPoseMembers[i]));
-      if (member == answer.members.end() || !member->second.is_number()) return answer;
-      pose.pose[i] = member->second.number();
+      const auto name = std::ranges::find(read.names, kPoseMembers[i]);
+      if (name == read.names.end() || read.names.size() != kPoseMembers.size()) return read;
+      const Value& member = read.values[static_cast<std::size_t>(name - read.names.begin())];
+      if (!member.is_number()) return read;
+      pose.pose[i] = member.number();
     }
-    return {Value(pose)};
+    return pose;
   }
 
   std::string_view rest_;
@@ -237,19 +243,17 @@ std::expected<Value, std::string> read_xml_rpc_answer(std::string_view xml) {
   Reader reader(xml);
   reader.open("methodResponse");
   if (reader.opens("fault")) {
-    const Answer fault = reader.value();
-    const auto said = fault.members.find("faultString");
-    return std::unexpected(said == fault.members.end() ? "a fault" : text_of(said->second));
+    const Computed said = element_of(reader.value(), std::vector<Value>{std::string("faultString")});
+    return std::unexpected(said ? text_of(*said) : "a fault");
   }
   reader.open("params");
   if (reader.ok() && !reader.opens("param")) return Value();
-  const Answer answer = reader.value();
+  Value answer = reader.value();
   reader.close("param");
   reader.close("params");
   reader.close("methodResponse");
   if (!reader.ok()) return std::unexpected("the answer cannot be read");
-  if (!answer.members.empty()) return std::unexpected("the answer is a struct that is no pose");
-  return answer.value;
+  return answer;
 }
 
 }  // namespace firstlook::sim::ur::script

@@ -1,5 +1,5 @@
 /// Values of URScript as XML-RPC has them: bool, int, float and string by their types, a list as an array, a pose as a
-/// struct of x, y, z, rx, ry and rz.
+/// struct of x, y, z, rx, ry and rz, a struct as itself.
 #pragma once
 
 #include <expected>

@@ -386,4 +386,18 @@ TEST_CASE("programs may have several statements on a line, on script ports, too"
   CHECK(robot.texts == std::vector<std::string>{"end 3", "next"});
 }
 
+TEST_CASE("lines change structs and lists, the program's and their own", "[ur][interpreter]") {
+  Interpreted robot(
+      "def prog():\n  local mine = struct(list = make_list(1, 5, 9), name = \"m\")\n  interpreter_mode()\n"
+      "  textmsg(mine)\nend\n");
+  CHECK(robot.ask("mine.list.append(6)") == "ack: 1: mine.list.append(6)");
+  CHECK(robot.id("mine.name = \"n\"") == 2);
+  CHECK(robot.id("own = struct(a = [[1, 2], [3, 4]])") == 3);
+  CHECK(robot.id("own.a[1, 0] = 7") == 4);
+  CHECK(robot.id("textmsg(own)") == 5);
+  CHECK(robot.ask("neither.a = 1") == "discard: Compile error: neither.a = 1");
+  CHECK(robot.id("end_interpreter()", 0.1) == 6);
+  CHECK(robot.texts == std::vector<std::string>{"struct(a = [[1, 2], [7, 4]])", "struct(list = [5, 6], name = n)"});
+}
+
 }  // namespace firstlook

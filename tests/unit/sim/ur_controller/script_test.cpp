@@ -9,67 +9,6 @@ using namespace test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 
-TEST_CASE("expressions", "[ur][script]") {
-  ScriptRobot robot;
-  CHECK(robot.value("1 + 2 * 3 - 4") == "3");
-  CHECK(robot.value("(1 + 2) * 3") == "9");
-  CHECK(robot.value("7 / 2") == "3.5");
-  CHECK(robot.value("7 % 3") == "1");
-  CHECK(robot.value("-2 + 1.5") == "-0.5");
-  CHECK(robot.value("1e-3 * 2") == "0.002");
-  CHECK(robot.value("2147483647 + 1") == "-2147483648");
-  CHECK(robot.value("1 < 2 and not 2 <= 1") == "True");
-  CHECK(robot.value("False or 1 == 1.0") == "True");
-  CHECK(robot.value("True xor True") == "False");
-  CHECK(robot.value("False and 1/0 == 1") == "False");  // not evaluated
-  CHECK(robot.value("[1, 2.5, [True]]") == "[1, 2.5, [True]]");
-  CHECK(robot.value("[10, 20, 30][1]") == "20");
-  CHECK(robot.value("p[1,2,3,0,0,0.5]") == "p[1, 2, 3, 0, 0, 0.5]");
-  CHECK(robot.value("p[1,2,3,0,0,0.5][2]") == "3");
-  CHECK(robot.value("[1,2] == [1,2]") == "True");
-  CHECK(robot.value("\"a b\" != \"a\"") == "True");
-  CHECK(robot.value("str_cat(\"x\", 5)") == "x5");
-  CHECK(robot.value("sqrt(16) + floor(2.7) + pow(2, 3)") == "14");
-  CHECK(robot.value("r2d(atan2(1, 1))") == "45");
-  CHECK(robot.value("norm([3, 4])") == "5");
-  CHECK(robot.value("length([1,2,3])") == "3");
-  CHECK(robot.value("to_num(\"2.5\")") == "2.5");
-  CHECK(robot.value("str_find(\"hello\", \"l\")") == "2");
-  CHECK(robot.value("binary_list_to_integer([True, False, True])") == "5");
-  CHECK(robot.value("integer_to_binary_list(2)[1]") == "True");
-  CHECK_THAT(robot.value("1 / 0"), Contains("Division by zero"));
-  CHECK_THAT(robot.value("[1][1]"), Contains("out of bounds"));
-  CHECK_THAT(robot.value("\"a\" + 1"), Contains("Type error"));
-  CHECK_THAT(robot.value("sqrt(-1)"), StartsWith("!"));
-  CHECK_THAT(robot.value("textmsg(1)"), StartsWith("!"));  // has no value
-}
-
-TEST_CASE("vectors, matrices and wrenches", "[ur][script]") {
-  ScriptRobot robot;
-  CHECK(robot.value("norm(p[3, 4, 0, 0, 0, 0])") == "5");
-  CHECK(robot.value("normalize([0, 3, 4])") == "[0, 0.6, 0.8]");
-  CHECK(robot.value("size([[1, 2, 3], [4, 5, 6]])") == "[2, 3]");
-  CHECK(robot.value("transpose([[1, 2, 3], [4, 5, 6]])") == "[[1, 4], [2, 5], [3, 6]]");
-  CHECK(robot.value("inv(p[1, 2, 3, 0, 0, 0])") == robot.value("pose_inv(p[1, 2, 3, 0, 0, 0])"));
-  // 10 N along y, seen from 0.5 m further along x: a torque about z.
-  CHECK(robot.value("wrench_trans(p[0.5, 0, 0, 0, 0, 0], [0, 10, 0, 0, 0, 0])") == "[0, 10, 0, 0, 0, -5]");
-  CHECK(robot.value("get_target_payload_inertia()") == "[0, 0, 0, 0, 0, 0]");
-}
-
-TEST_CASE("poses", "[ur][script]") {
-  ScriptRobot robot;
-  CHECK(robot.value("pose_trans(p[1,0,0,0,0,1.5707963267948966], p[1,0,0,0,0,0])") == "p[1, 1, 0, 0, 0, 1.5708]");
-  CHECK(robot.value(
-            "point_dist(pose_trans(pose_inv(p[1,2,3,0.1,0.2,0.3]), p[1,2,3,0.1,0.2,0.3]), p[0,0,0,0,0,0]) < 1e-9") ==
-        "True");
-  CHECK(robot.value("pose_add(p[1,0,0,0,0,0], p[0,1,0,0,0,0])") == "p[1, 1, 0, 0, 0, 0]");
-  CHECK(robot.value("interpolate_pose(p[0,0,0,0,0,0], p[1,0,0,0,0,1], 0.5)") == "p[0.5, 0, 0, 0, 0, 0.5]");
-  CHECK(robot.value("rpy2rotvec([0.3, 0, 0])") == "[0.3, 0, 0]");
-  CHECK(robot.value("point_dist(get_forward_kin(), get_actual_tcp_pose()) < 1e-9") == "True");
-  CHECK(robot.value("norm(get_inverse_kin(get_actual_tcp_pose()) - get_actual_joint_positions()) < 1e-6") == "True");
-  CHECK(robot.value("get_inverse_kin_has_solution(p[5,0,0,0,0,0])") == "False");
-}
-
 TEST_CASE("control flow, functions and scopes", "[ur][script]") {
   ScriptRobot robot;
   robot.send(R"(def prog():

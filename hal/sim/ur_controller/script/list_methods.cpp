@@ -1,0 +1,120 @@
+#include "hal/sim/ur_controller/script/list_methods.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace firstlook::sim::ur::script {
+namespace {
+
+/// The list while a method works on it.
+struct Target {
+  List& list;
+  std::size_t capacity;
+
+  [[nodiscard]] std::size_t room() const { return capacity - std::min(capacity, list.size()); }
+};
+
+using Arguments = std::span<const Value>;
+
+Computed insert_at(Target& target, std::size_t at, Arguments values) {
+  List& list = target.list;
+  if (values.size() > target.room()) {
+    return std::unexpected(fmt::format("The list has a capacity of {} elements", target.capacity));
+  }
+  for (const Value& value : values) {
+    const Value& kind = list.empty() ? values.front() : list.front();
+    if (!alike(value, kind)) {
+      return std::unexpected(fmt::format("Type error: a list of {} is given {}", type_name(kind), type_name(value)));
+    }
+  }
+  list.insert(list.begin() + static_cast<std::ptrdiff_t>(at), values.begin(), values.end());
+  return Value();
+}
+
+Computed append(Target& target, Arguments arguments) { return insert_at(target, target.list.size(), arguments); }
+
+Computed extend(Target& target, Arguments arguments) {
+  const List* more = arguments[0].as<List>();
+  if (more == nullptr) return std::unexpected(fmt::format("Type error: extend by {}", type_name(arguments[0])));
+  return insert_at(target, target.list.size(), *more);
+}
+
+Computed insert(Target& target, Arguments arguments) {
+  const auto at = index_within(arguments[0], target.list.size() + 1);
+  return at ? insert_at(target, *at, arguments.subspan(1)) : std::unexpected(at.error());
+}
+
+Computed take(Target& target, std::size_t at) {
+  Value value = std::move(target.list[at]);
+  target.list.erase(target.list.begin() + static_cast<std::ptrdiff_t>(at));
+  return value;
+}
+Computed pop(Target& target, Arguments) {
+  if (target.list.empty()) return std::unexpected("The list is empty");
+  return take(target, target.list.size() - 1);
+}
+Computed remove(Target& target, Arguments arguments) {
+  const auto at = index_within(arguments[0], target.list.size());
+  return at ? take(target, *at) : std::unexpected(at.error());
+}
+
+Computed clear(Target& target, Arguments) {
+  target.list.clear();
+  return Value();
+}
+
+/// From an index to before another.
+Computed slice(Target& target, Arguments arguments) {
+  const auto begin = index_within(arguments[0], target.list.size() + 1),
+             end = index_within(arguments[1], target.list.size() + 1);
+  if (!begin || !end) return std::unexpected(begin ? end.error() : begin.error());
+  if (*begin > *end) return std::unexpected("A slice that ends before it begins");
+  return Value(List(target.list.begin() + static_cast<std::ptrdiff_t>(*begin),
+                    target.list.begin() + static_cast<std::ptrdiff_t>(*end)));
+}
+
+Value count(std::size_t number) { return static_cast<std::int64_t>(number); }
+
+struct Method {
+  std::string_view name;
+  std::size_t arguments;
+  bool changes;
+  Computed (*run)(Target& target, Arguments arguments);
+};
+
+constexpr std::array<Method, 11> kMethods = {{
+    {"append", 1, true, append},
+    {"capacity", 0, false, [](Target& t, Arguments) { return Computed(count(t.capacity)); }},
+    {"clear", 0, true, clear},
+    {"excess_capacity", 0, false, [](Target& t, Arguments) { return Computed(count(t.room())); }},
+    {"extend", 1, true, extend},
+    {"insert", 2, true, insert},
+    {"length", 0, false, [](Target& t, Arguments) { return Computed(count(t.list.size())); }},
+    {"pop", 0, true, pop},
+    {"remove", 1, true, remove},
+    {"slice", 2, false, slice},
+    {"to_string", 0, false, [](Target& t, Arguments) { return Computed(text_of(Value(t.list))); }},
+}};
+
+}  // namespace
+
+bool is_changing_method(std::string_view method) {
+  const auto found = std::ranges::find(kMethods, method, &Method::name);
+  return found != kMethods.end() && found->changes;
+}
+
+Computed call_list_method(Value& list, std::string_view method, std::span<const Value> arguments) {
+  const auto found = std::ranges::find(kMethods, method, &Method::name);
+  if (found == kMethods.end()) return std::unexpected(fmt::format("A list has no method {}", method));
+  if (arguments.size() != found->arguments) {
+    return std::unexpected(fmt::format("{} takes {} arguments, not {}", method, found->arguments, arguments.size()));
+  }
+  Target target{*list.as<List>(), list.capacity};
+  Computed answer = found->run(target, arguments);
+  if (answer && found->changes) list = with_capacity(std::move(target.list), list.capacity);
+  return answer;
+}
+
+}  // namespace firstlook::sim::ur::script
