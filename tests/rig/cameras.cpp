@@ -93,7 +93,8 @@ class WatchedFeed final : public sim::TrueJointFeed {
   [[nodiscard]] bool gone() const { return monotonic_ns() - heard_ns_ > kGone_ns; }
 
  private:
-  static constexpr double kStands_rad = 1e-6;
+  // After a motion an arm swings by up to 1.2 mrad about its rest: it stands, for all that.
+  static constexpr double kStands_rad = 3e-3;
   static constexpr std::int64_t kGone_ns = 1'000'000'000;
   sim::TrueJointFeed& feed_;
   JointVector stood_rad_ = JointVector::zero(kJointsMax);
@@ -128,7 +129,7 @@ enum class Shown : std::uint8_t { kLast, kNone, kNew };
 class Freshness {
  public:
   [[nodiscard]] Shown next(std::int64_t moved_ns) {
-    constexpr std::int64_t kStands_ns = 60'000'000, kSwings_ns = 200'000'000;
+    constexpr std::int64_t kStands_ns = 60'000'000, kSwings_ns = 250'000'000;
     if (rendered_ns_ > moved_ns) return Shown::kLast;
     const std::int64_t stood_ns = monotonic_ns() - moved_ns;
     if (stood_ns < kStands_ns && rendered_ns_ != 0) return Shown::kLast;
