@@ -95,22 +95,22 @@ cameras_off_in_ready() {
 
 # From the button to the report, with few views; then a fresh process is in Ready.
 job_to_its_end() {
-  local before from run peak
+  local before from folder peak
   before=$(restarts)
   start_job
   from=$(guest "cut -d ' ' -f 1 /proc/uptime")
   guest "(group=/sys/fs/cgroup\$(systemctl show -p ControlGroup --value firstlook); while cat \$group/memory.peak; do sleep 1; done) >/run/rig/peaks 2>/dev/null </dev/null & disown"
   guest_patience_s=3000 await 1200 "[ \"\$(systemctl show -p NRestarts --value firstlook)\" -gt $before ]" >/dev/null ||
     fail "the job does not come to its end: $(status_of)"
-  run=$(guest "ls -dt /var/lib/firstlook/runs/*/ | grep -v /waiting/ | head -n 1")
-  guest "grep -q '\"outcome\": \"done\"' $run/result.json" ||
-    fail "the job ended with: $(guest "grep -m 3 -E '\"(outcome|reason)\"' $run/result.json; journalctl -b -u firstlook -o cat --no-pager -n 12")"
+  folder=$(guest "ls -dt /var/lib/firstlook/runs/*/ | grep -v /waiting/ | head -n 1")
+  guest "grep -q '\"outcome\": \"done\"' $folder/result.json" ||
+    fail "the job ended with: $(guest "grep -m 3 -E '\"(outcome|reason)\"' $folder/result.json; journalctl -b -u firstlook -o cat --no-pager -n 12")"
   peak=$(guest "sort -n /run/rig/peaks | tail -n 1")
   say "the job ended with its report after $(guest "cut -d ' ' -f 1 /proc/uptime" | awk -v from="$from" '{ printf "%.0f", $1 - from }') s: $(guest "journalctl -b -u firstlook -o cat --no-pager | grep '^done:' | tail -n 1" | cut -c 1-160)"
   say "memory of the service at most $((peak / 1048576)) MiB of the limit of 384"
   [ "$peak" -lt $((384 << 20)) ] || fail "more memory than the limit"
-  guest "firstlook replay $run/journal.flj" || fail "the job's journal does not replay"
-  guest "[ ! -e $run/checkpoint.yaml ]" || fail "a job that has ended left a checkpoint"
+  guest "firstlook replay $folder/journal.flj" || fail "the job's journal does not replay"
+  guest "[ ! -e $folder/checkpoint.yaml ]" || fail "a job that has ended left a checkpoint"
   again 60
   expect_light green
   stands 3 "the job has ended"
