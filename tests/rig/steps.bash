@@ -99,7 +99,9 @@ short() {
   expect_light green
   stands 3 "nobody has pressed anything"
   start_job
-  guest "sleep 2"
+  await 60 "journalctl -b -u firstlook -o cat --no-pager | grep -q 'calibration view 1'" >/dev/null ||
+    fail "the job does not see its board: $(status_of)"
+  say "the job sees its board: $(guest "journalctl -b -u firstlook -o cat --no-pager | grep 'looking for the board' | tail -n 1")"
   say "power cut: $(status_of | sed 's/.*"state": "\([^"]*\)".*/\1/')"
   power_cut
   boot 90
