@@ -63,6 +63,11 @@ std::vector<Parameter> parameters_of(int number) {
   return parameters;
 }
 
+void Call::answer_or_fail(Computed computed) {
+  if (!computed) return fail(computed.error());
+  answer(std::move(*computed));
+}
+
 void Call::fail_type(std::size_t i, std::string_view wanted) {
   fail(fmt::format("Type error: argument {} is {}, not {}", i + 1, type_name(arguments_[i]), wanted));
 }

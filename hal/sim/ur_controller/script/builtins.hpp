@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hal/sim/ur_controller/script/machine.hpp"
+#include "hal/sim/ur_controller/script/operations.hpp"
 
 namespace firstlook::sim::ur::script {
 
@@ -19,6 +20,7 @@ class Call {
   [[nodiscard]] Controller& controller() { return machine_.controller(); }
   [[nodiscard]] const ControllerState& robot() { return machine_.controller().state(); }
   [[nodiscard]] const Thread& thread() const { return thread_; }
+  [[nodiscard]] Value& variable(int slot) { return machine_.variable(thread_, slot); }
   [[nodiscard]] CallState& state() { return thread_.call; }
 
   [[nodiscard]] const Value& value(std::size_t i) const { return arguments_[i]; }
@@ -36,6 +38,7 @@ class Call {
   [[nodiscard]] JointVector joints(std::size_t i);
 
   void answer(Value value) { answer_ = std::move(value); }
+  void answer_or_fail(Computed computed);
   /// To be called again in the next cycle.
   void wait() { waits_ = true; }
   /// For `seconds` from the first call; true when they are over.

@@ -1,16 +1,13 @@
 // Numbers, lists and poses.
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
-#include "hal/sim/ur_controller/script/operations.hpp"
+#include "hal/sim/ur_controller/script/matrices.hpp"
 
 namespace firstlook::sim::ur::script {
 namespace {
-
-constexpr Eigen::Index kInverseSizeMax = 50;
 
 template <double (*F)(double)>
 void function(Call& c) {
@@ -66,43 +63,21 @@ void normalize(Call& c) {
 
 /// Of a matrix its rows and columns.
 void size_of(Call& c) {
-  const std::size_t columns = matrix_columns(c.value(0));
+  const std::size_t columns = columns_of(c.value(0));
   if (columns == 0) return list_length(c);
   const std::size_t rows = c.value(0).as<List>()->size();
   c.answer(List{Value(static_cast<std::int64_t>(rows)), Value(static_cast<std::int64_t>(columns))});
 }
-void transpose(Call& c) {
-  List columns;
-  for (std::size_t j = 0; j < matrix_columns(c.value(0)); ++j) {
-    List column;
-    for (const Value& row : *c.value(0).as<List>()) column.push_back((*row.as<List>())[j]);
-    columns.emplace_back(std::move(column));
-  }
-  if (columns.empty()) return c.fail_type(0, "a matrix");
-  c.answer(std::move(columns));
-}
 
+void transpose(Call& c) { c.answer_or_fail(transpose_of(c.value(0))); }
 /// Of a pose or a square matrix.
 void inverse(Call& c) {
-  const auto size = static_cast<Eigen::Index>(matrix_columns(c.value(0)));
-  if (size == 0) return c.answer(PoseValue{vector_of(c.pose(0).inverse(Eigen::Isometry))});
-  const List& rows = *c.value(0).as<List>();
-  if (std::ssize(rows) != size || size > kInverseSizeMax) return c.fail_type(0, "a square matrix of up to 50 rows");
-  Eigen::MatrixXd matrix(size, size);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    const List& row = *rows[static_cast<std::size_t>(i)].as<List>();
-    for (Eigen::Index j = 0; j < size; ++j) matrix(i, j) = row[static_cast<std::size_t>(j)].number();
+  const List* rows = c.value(0).as<List>();
+  if (rows == nullptr || rows->empty() || rows->front().as<List>() == nullptr) {
+    return c.answer(PoseValue{vector_of(c.pose(0).inverse(Eigen::Isometry))});
   }
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(matrix);
-  if (!matrix.allFinite() || !lu.isInvertible()) return c.fail("The matrix has no inverse");
-  const Eigen::MatrixXd result = lu.inverse();
-  List inverse_rows;
-  for (Eigen::Index i = 0; i < size; ++i) {
-    List row;
-    for (Eigen::Index j = 0; j < size; ++j) row.emplace_back(result(i, j));
-    inverse_rows.emplace_back(std::move(row));
-  }
-  c.answer(std::move(inverse_rows));
+  c.machine().charge(rows->size() * rows->size() * rows->size() / 2);
+  c.answer_or_fail(inverse_of_matrix(c.value(0)));
 }
 
 void pose_trans(Call& c) { c.answer(PoseValue{vector_of(c.pose(0) * c.pose(1))}); }
@@ -203,8 +178,9 @@ void random_number(Call& c) {
 void make_list(Call& c) {
   const int length = c.integer(0, 0, 1000), capacity = c.integer(2, 0, static_cast<int>(kWeightMax));
   if (capacity != 0 && capacity < length) c.fail("A list longer than its capacity");
+  if (c.value(1).weight * static_cast<std::size_t>(length) > kWeightMax) c.fail(std::string(kTooLarge));
   if (!c.ok()) return;
-  c.answer(with_capacity(List(static_cast<std::size_t>(length), c.value(1)), static_cast<std::uint32_t>(capacity)));
+  c.answer(with_capacity(List(static_cast<std::size_t>(length), c.value(1)), static_cast<std::size_t>(capacity)));
 }
 
 constexpr Builtin kTable[] = {

@@ -1,9 +1,9 @@
 // Structs, and methods: of lists, and of servers.
-#include <algorithm>
+#include <set>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
 #include "hal/sim/ur_controller/script/list_methods.hpp"
-#include "hal/sim/ur_controller/script/operations.hpp"
+#include "hal/sim/ur_controller/script/places.hpp"
 
 namespace firstlook::sim::ur::script {
 namespace {
@@ -11,9 +11,10 @@ namespace {
 /// Of names and values in turn.
 void make_struct(Call& c) {
   StructValue made;
+  std::set<std::string> names;
   for (std::size_t i = 0; i < c.values().size(); i += 2) {
     const std::string name = c.text(i);
-    if (std::ranges::find(made.names, name) != made.names.end()) return c.fail("A struct has two members " + name);
+    if (!names.insert(name).second) return c.fail("A struct has two members " + name);
     if (c.value(i + 1).empty()) return c.fail("Type error: member " + name + " has no value");
     made.names.push_back(name);
     made.values.push_back(c.value(i + 1));
@@ -21,35 +22,30 @@ void make_struct(Call& c) {
   c.answer(std::move(made));
 }
 
-/// `object` is changed where the method changes a list.
-void call_on(Call& c, Value& object, const std::string& method, std::span<const Value> arguments) {
-  if (const RpcHandle* rpc = object.as<RpcHandle>()) return call_remote(c, *rpc, method, arguments);
-  if (object.as<List>() == nullptr) return c.fail("Type error: a method of " + std::string(type_name(object)));
-  Computed answer = call_list_method(object, method, arguments);
-  if (!answer) return c.fail(answer.error());
-  c.answer(std::move(*answer));
-}
-
 /// object, method, arguments.
 void call_method(Call& c) {
+  const auto arguments = c.values().subspan(2);
+  if (const RpcHandle* rpc = c.value(0).as<RpcHandle>()) return call_remote(c, *rpc, c.text(1), arguments);
   Value object = c.value(0);
-  call_on(c, object, c.text(1), c.values().subspan(2));
+  c.machine().charge(object.weight);
+  c.answer_or_fail(call_list_method(object, c.text(1), arguments));
 }
 
-/// length of the path, variable, path, method, arguments: answers the variable with what the method changed in it, and
-/// the method's answer. A server's method may have such a name, too.
+/// slot of a variable, length of a path, path, method, arguments. A server's method may have the name of one that
+/// changes a list.
 void call_changing_method(Call& c) {
-  const auto length = static_cast<std::size_t>(c.integer(0));
-  const Value& variable = c.value(1);
-  const auto path = c.values().subspan(2, length);
-  Computed object = element_of(variable, path);
-  if (!object) return c.fail(object.error());
-  const bool list = object->as<List>() != nullptr;
-  call_on(c, *object, c.text(2 + length), c.values().subspan(3 + length));
-  if (!c.ok() || c.waits()) return;
-  Computed changed = list ? with_element(variable, path, *object) : Computed(variable);
-  if (!changed) return c.fail(changed.error());
-  c.answer(List{std::move(*changed), std::move(c.answer())});
+  Value& variable = c.variable(static_cast<int>(c.integer(0)));
+  const auto length = static_cast<std::size_t>(c.integer(1));
+  const auto path = c.values().subspan(2, length), arguments = c.values().subspan(3 + length);
+  const std::string method = c.text(2 + length);
+  if (variable.empty()) return c.fail("A variable has no value yet");
+  const Value* object = find_element(variable, path);
+  if (object != nullptr && object->as<RpcHandle>() != nullptr) {
+    return call_remote(c, RpcHandle(*object->as<RpcHandle>()), method, arguments);
+  }
+  if (method == "insert" || method == "remove") c.machine().charge(variable.weight / 2);  // the others make way
+  c.answer_or_fail(call_at(variable, path, method, arguments));
+  if (variable.too_large()) c.fail(std::string(kTooLarge));
 }
 
 /// Names that no script can call: methods are compiled to them.

@@ -17,8 +17,7 @@ enum class Op : std::uint8_t {
   kLoadGlobal,   ///< push global a
   kStoreGlobal,  ///< pop into global a
   kIndex,        ///< container, a indices -> element; a member is the index of its name
-  kSetElement,   ///< container, a indices, value -> container with the element replaced
-  kUnpack,       ///< list of two -> the second, the first
+  kSetElement,   ///< a indices, value: into the variable in slot b
   kNegate,
   kNot,
   kBinary,           ///< a: a BinaryOp

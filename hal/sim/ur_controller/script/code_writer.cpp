@@ -102,7 +102,7 @@ void CodeWriter::load(const Token& name) {
   } else if (const auto shared = code_.global_numbers.find(name.text); shared != code_.global_numbers.end()) {
     emit_at(name, Op::kLoadGlobal, shared->second);
   } else {
-    tokens_.fail({name.line, name.column, fmt::format("compile_error_name_not_found:{}:", name.text)});
+    fail_name(name);
   }
 }
 
@@ -118,6 +118,23 @@ void CodeWriter::store(const Token& name, bool global, bool local) {
   } else {
     emit_at(name, Op::kStoreLocal, declare_local(name.text));
   }
+}
+
+int CodeWriter::slot_of(const Token& name, bool global, bool local) {
+  const Scope& scope = scopes_.back();
+  const bool shared = code_.global_numbers.contains(name.text);
+  if (local && shared && !scope.top && !scope.locals.contains(name.text)) {
+    load(name);
+    store(name, false, true);  // a copy of its own
+  }
+  if (const auto own = scope.locals.find(name.text); own != scope.locals.end() && !global) return own->second;
+  if (shared) return ~code_.global_numbers[name.text];
+  fail_name(name);
+  return 0;
+}
+
+void CodeWriter::fail_name(const Token& name) {
+  tokens_.fail({name.line, name.column, fmt::format("compile_error_name_not_found:{}:", name.text)});
 }
 
 void CodeWriter::aim(int instruction) {

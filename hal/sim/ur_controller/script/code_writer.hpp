@@ -39,12 +39,17 @@ class CodeWriter {
   /// Its number, of this script or of the one that it is compiled into.
   [[nodiscard]] int called_number(const std::string& function);
 
+  /// There is nothing of that name.
+  void fail_name(const Token& name);
+
   // --- instructions ---
   int emit(Op op, int a = 0, int b = 0) { return emit_at(tokens_.now(), op, a, b); }
   int emit_at(const Token& where, Op op, int a = 0, int b = 0);
   void constant(Value value);
   void load(const Token& name);
   void store(const Token& name, bool global, bool local);
+  /// Where the variable is that elements are set in: a local's number, or ~number of a global.
+  [[nodiscard]] int slot_of(const Token& name, bool global, bool local);
   [[nodiscard]] int here() const { return static_cast<int>(scopes_.back().function.instructions.size()); }
   /// A jump that was written before leads here.
   void aim(int instruction);

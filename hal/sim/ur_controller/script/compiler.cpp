@@ -254,12 +254,15 @@ class Compiler {
     }
     tokens_.advance();
     const bool element = !tokens_.now().is("=");
-    if (element) writer_.load(target);
+    const int slot = element ? writer_.slot_of(target, global, local) : 0;
     const int count = expressions_.place();
     tokens_.expect("=");
     expressions_.expression();
-    if (element) writer_.emit_at(target, Op::kSetElement, count);
-    writer_.store(target, global, local);
+    if (element) {
+      writer_.emit_at(target, Op::kSetElement, count, slot);
+    } else {
+      writer_.store(target, global, local);
+    }
   }
 
   TokenCursor tokens_;

@@ -135,7 +135,7 @@ int ExpressionCompiler::place() {
       count += indices();
     } else if (tokens_.now().is(".") && !tokens_.ahead(2).is("(")) {
       tokens_.advance();
-      writer_.constant(tokens_.expect_name());
+      writer_.constant(tokens_.expect_member());
       ++count;
     } else {
       break;
@@ -161,22 +161,20 @@ void ExpressionCompiler::method() {
   writer_.emit_at(name, Op::kCallBuiltin, find_builtin("."), count + 2);
 }
 
-/// variable[2].append(...): how many values lead to the list, the variable, those values, the method, its arguments.
-/// What comes back is the variable with the changed list, and the method's answer.
+/// variable[2].append(...): the variable's slot, how many values lead to the list, those values, the method, its
+/// arguments.
 void ExpressionCompiler::change(const Token& variable) {
   tokens_.advance();
   int depth = 0;
   const std::vector<Instruction> path = writer_.apart([&] { depth = place(); });
+  writer_.constant(std::int64_t{writer_.slot_of(variable, false, false)});
   writer_.constant(std::int64_t{depth});
-  writer_.load(variable);
   writer_.append(path);
   tokens_.expect(".");
   writer_.constant(tokens_.expect_name());
   tokens_.expect("(");
   const int count = elements(")");
   writer_.emit_at(variable, Op::kCallBuiltin, find_builtin(".="), depth + count + 3);
-  writer_.emit_at(variable, Op::kUnpack);
-  writer_.store(variable, false, false);
 }
 
 void ExpressionCompiler::primary() {
@@ -268,7 +266,7 @@ void ExpressionCompiler::pose(const Token& token) {
   if (count == 6) {
     writer_.append(values);
     writer_.emit_at(token, Op::kMakePose);
-  } else if (count == 1 || count == 2) {
+  } else if (count == 1 || (count > 0 && writer_.is_variable(token.text))) {
     writer_.load(token);
     writer_.append(values);
     writer_.emit_at(token, Op::kIndex, count);
@@ -284,11 +282,11 @@ void ExpressionCompiler::structure() {
   tokens_.advance();
   int members = 0;
   do {
-    writer_.constant(tokens_.expect_name());
+    writer_.constant(tokens_.expect_member());
     tokens_.expect("=");
     expression();
     ++members;
-  } while (!tokens_.failed() && tokens_.accept(","));
+  } while (!tokens_.failed() && tokens_.accept(",") && !tokens_.now().is(")"));
   tokens_.expect(")");
   writer_.emit_at(where, Op::kCallBuiltin, find_builtin("struct"), 2 * members);
 }
@@ -296,7 +294,7 @@ void ExpressionCompiler::structure() {
 void ExpressionCompiler::run_thread() {
   tokens_.advance();
   const Token name = tokens_.now();
-  if (name.kind != Kind::kName || !writer_.is_function(name.text)) return fail_name(name);
+  if (name.kind != Kind::kName || !writer_.is_function(name.text)) return writer_.fail_name(name);
   tokens_.advance();
   tokens_.expect("(");
   tokens_.expect(")");
@@ -316,7 +314,7 @@ void ExpressionCompiler::call(const Token& name) {
 }
 
 void ExpressionCompiler::call_builtin(const Token& name, int builtin) {
-  if (builtin < 0) return fail_name(name);
+  if (builtin < 0) return writer_.fail_name(name);
   const bool interprets = name.is("interpreter_mode");
   if (interprets && writer_.interpreted()) {
     return tokens_.fail({name.line, name.column, "compile_error_nested_interpreter_mode:"});
@@ -354,10 +352,6 @@ void ExpressionCompiler::arguments(const Token& name, const std::vector<Paramete
       fail_arguments(name);
     }
   }
-}
-
-void ExpressionCompiler::fail_name(const Token& name) {
-  tokens_.fail({name.line, name.column, fmt::format("compile_error_name_not_found:{}:", name.text)});
 }
 
 void ExpressionCompiler::fail_arguments(const Token& name) {

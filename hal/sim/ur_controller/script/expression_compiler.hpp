@@ -47,7 +47,6 @@ class ExpressionCompiler {
   [[nodiscard]] int elements(std::string_view closing);
   [[nodiscard]] int indices();
   void arguments(const Token& name, const std::vector<Parameter>& parameters);
-  void fail_name(const Token& name);
   void fail_arguments(const Token& name);
 
   TokenCursor& tokens_;

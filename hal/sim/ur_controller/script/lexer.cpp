@@ -130,6 +130,15 @@ class Lexer {
 
 }  // namespace
 
+bool is_keyword(std::string_view word) {
+  constexpr std::array<std::string_view, 26> kWords = {
+      "and",           "break", "continue", "def",    "elif", "else", "end",    "enter_critical",
+      "exit_critical", "False", "global",   "halt",   "if",   "join", "kill",   "local",
+      "not",           "or",    "pass",     "return", "run",  "sec",  "thread", "True",
+      "while",         "xor"};
+  return std::ranges::find(kWords, word) != kWords.end();
+}
+
 std::expected<std::vector<Token>, ScriptError> tokenize(std::string_view script) { return Lexer(script).run(); }
 
 ScriptError syntax_error(std::string_view script, int line, int column) {

@@ -26,6 +26,9 @@ struct Token {
   }
 };
 
+/// A word of the language itself.
+[[nodiscard]] bool is_keyword(std::string_view word);
+
 /// Line ends within brackets and after operators are left out, and comments; several line ends are one. The last token
 /// is kEnd.
 [[nodiscard]] std::expected<std::vector<Token>, ScriptError> tokenize(std::string_view script);

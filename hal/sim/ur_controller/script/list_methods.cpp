@@ -5,15 +5,17 @@
 #include <algorithm>
 #include <array>
 
+#include "hal/sim/ur_controller/script/places.hpp"
+
 namespace firstlook::sim::ur::script {
 namespace {
 
 /// The list while a method works on it.
 struct Target {
+  Value& value;
   List& list;
-  std::size_t capacity;
 
-  [[nodiscard]] std::size_t room() const { return capacity - std::min(capacity, list.size()); }
+  [[nodiscard]] std::size_t room() const { return value.capacity - std::min<std::size_t>(value.capacity, list.size()); }
 };
 
 using Arguments = std::span<const Value>;
@@ -21,15 +23,20 @@ using Arguments = std::span<const Value>;
 Computed insert_at(Target& target, std::size_t at, Arguments values) {
   List& list = target.list;
   if (values.size() > target.room()) {
-    return std::unexpected(fmt::format("The list has a capacity of {} elements", target.capacity));
+    return std::unexpected(fmt::format("The list has a capacity of {} elements", target.value.capacity));
   }
   for (const Value& value : values) {
+    if (value.empty()) return std::unexpected("Type error: something without a value is put into a list");
     const Value& kind = list.empty() ? values.front() : list.front();
     if (!alike(value, kind)) {
       return std::unexpected(fmt::format("Type error: a list of {} is given {}", type_name(kind), type_name(value)));
     }
   }
   list.insert(list.begin() + static_cast<std::ptrdiff_t>(at), values.begin(), values.end());
+  for (const Value& value : values) {
+    target.value.weight += value.weight;
+    target.value.depth = std::max<std::uint16_t>(target.value.depth, static_cast<std::uint16_t>(value.depth + 1));
+  }
   return Value();
 }
 
@@ -48,6 +55,7 @@ Computed insert(Target& target, Arguments arguments) {
 
 Computed take(Target& target, std::size_t at) {
   Value value = std::move(target.list[at]);
+  target.value.weight -= value.weight;
   target.list.erase(target.list.begin() + static_cast<std::ptrdiff_t>(at));
   return value;
 }
@@ -62,6 +70,7 @@ Computed remove(Target& target, Arguments arguments) {
 
 Computed clear(Target& target, Arguments) {
   target.list.clear();
+  target.value.weight = 1;
   return Value();
 }
 
@@ -86,7 +95,7 @@ struct Method {
 
 constexpr std::array<Method, 11> kMethods = {{
     {"append", 1, true, append},
-    {"capacity", 0, false, [](Target& t, Arguments) { return Computed(count(t.capacity)); }},
+    {"capacity", 0, false, [](Target& t, Arguments) { return Computed(count(t.value.capacity)); }},
     {"clear", 0, true, clear},
     {"excess_capacity", 0, false, [](Target& t, Arguments) { return Computed(count(t.room())); }},
     {"extend", 1, true, extend},
@@ -106,15 +115,14 @@ bool is_changing_method(std::string_view method) {
 }
 
 Computed call_list_method(Value& list, std::string_view method, std::span<const Value> arguments) {
+  if (list.as<List>() == nullptr) return std::unexpected(fmt::format("Type error: a method of {}", type_name(list)));
   const auto found = std::ranges::find(kMethods, method, &Method::name);
   if (found == kMethods.end()) return std::unexpected(fmt::format("A list has no method {}", method));
   if (arguments.size() != found->arguments) {
     return std::unexpected(fmt::format("{} takes {} arguments, not {}", method, found->arguments, arguments.size()));
   }
-  Target target{*list.as<List>(), list.capacity};
-  Computed answer = found->run(target, arguments);
-  if (answer && found->changes) list = with_capacity(std::move(target.list), list.capacity);
-  return answer;
+  Target target{list, *list.as<List>()};
+  return found->run(target, arguments);
 }
 
 }  // namespace firstlook::sim::ur::script

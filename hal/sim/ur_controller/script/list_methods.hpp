@@ -12,8 +12,8 @@ namespace firstlook::sim::ur::script {
 /// By its name alone: append, clear, extend, insert, pop, remove.
 [[nodiscard]] bool is_changing_method(std::string_view method);
 
-/// What the method answers, none for many. Changes `list` where the method does; never beyond its capacity. Error: a
-/// method that lists have not, arguments that do not fit, no room.
+/// What the method answers, none for many. Changes `list` where the method does; never beyond its capacity. Error: no
+/// list, a method that lists have not, arguments that do not fit, no room.
 [[nodiscard]] Computed call_list_method(Value& list, std::string_view method, std::span<const Value> arguments);
 
 }  // namespace firstlook::sim::ur::script

@@ -6,15 +6,17 @@
 #include <span>
 
 #include "hal/sim/ur_controller/script/builtins.hpp"
-#include "hal/sim/ur_controller/script/operations.hpp"
+#include "hal/sim/ur_controller/script/matrices.hpp"
+#include "hal/sim/ur_controller/script/places.hpp"
 
 namespace firstlook::sim::ur::script {
 namespace {
 
 constexpr int kStepsMax = 5000;   // of one thread in one cycle
 constexpr double kBusyMax_s = 2;  // without ever waiting: then the controller says that it is too much behind
-constexpr std::uint64_t kMadeMax = 200'000;  // weight of values, of one thread in one cycle
-constexpr std::uint64_t kHeldMax = 500'000;  // of the whole program; some 70 bytes each
+constexpr std::uint64_t kMadeMax = 200'000;    // weight of values, of one thread in one cycle
+constexpr std::uint64_t kHeldMax = 500'000;    // of the whole program; some 70 bytes each
+constexpr std::size_t kProductsForWeight = 4;  // as much work as to make a value of weight 1
 constexpr std::size_t kFramesMax = 200;
 constexpr std::size_t kStackMax = 10'000;
 constexpr std::size_t kThreadsMax = 64;
@@ -73,6 +75,11 @@ bool Machine::take_arm(const Thread& thread) {
     controller_.set_script_line(static_cast<std::uint32_t>(instructions[frame.next].line));
   }
   return true;
+}
+
+Value& Machine::variable(Thread& thread, int slot) {
+  if (slot < 0) return globals_[static_cast<std::size_t>(~slot)];
+  return thread.stack[thread.frames.back().base + static_cast<std::size_t>(slot)];
 }
 
 void Machine::release_arm(const Thread& thread) {
@@ -171,7 +178,7 @@ bool Machine::execute_builtin(Thread& thread, const Instruction& instruction) {
     return false;
   }
   thread.call = {};
-  if (call.answer().weight > kWeightMax) return fail(instruction, "Out of memory: a list is too large"), false;
+  if (call.answer().too_large()) return fail(instruction, std::string(kTooLarge)), false;
   made_ += call.answer().weight;
   Value answer = std::move(call.answer());
   thread.stack.resize(thread.stack.size() - count);
@@ -220,7 +227,7 @@ bool Machine::execute(Thread& thread) {
   const auto a = static_cast<std::size_t>(instruction.a);
   const auto put = [&](Computed result) {
     if (!result) return fail(instruction, std::move(result.error())), false;
-    if (result->weight > kWeightMax) return fail(instruction, "Out of memory: a list is too large"), false;
+    if (result->too_large()) return fail(instruction, std::string(kTooLarge)), false;
     made_ += result->weight;
     stack.push_back(std::move(*result));
     return true;
@@ -295,7 +302,7 @@ bool Machine::execute(Thread& thread) {
     case Op::kStoreLocal:
     case Op::kStoreGlobal: {
       Value value = pop(thread);
-      if (value.empty()) return fail(instruction, "Type error: a function without a value is assigned"), false;
+      if (value.empty()) return fail(instruction, "Type error: something without a value is assigned"), false;
       Value& variable = instruction.op == Op::kStoreLocal ? stack[frame.base + a] : globals_[a];
       variable = assigned(variable, std::move(value));
       return true;
@@ -306,16 +313,13 @@ bool Machine::execute(Thread& thread) {
       return put(std::move(element));
     }
     case Op::kSetElement: {
-      const Value element = pop(thread);
-      const std::vector<Value> path(stack.end() - instruction.a, stack.end());
-      stack.resize(stack.size() - a);
-      Value container = pop(thread);
-      return put(with_element(std::move(container), path, element));
-    }
-    case Op::kUnpack: {
-      const Value pair = pop(thread);
-      const List& values = *pair.as<List>();
-      stack.insert(stack.end(), {values[1], values[0]});
+      Value& container = variable(thread, instruction.b);
+      if (container.empty()) return fail(instruction, "A variable has no value yet"), false;
+      made_ += stack.back().weight;
+      const Computed done = set_element(container, std::span<const Value>(stack).last(a + 1).first(a), stack.back());
+      if (!done) return fail(instruction, done.error()), false;
+      if (container.too_large()) return fail(instruction, std::string(kTooLarge)), false;
+      stack.resize(stack.size() - a - 1);
       return true;
     }
     case Op::kNegate:
@@ -329,6 +333,7 @@ bool Machine::execute(Thread& thread) {
     case Op::kBinary: {
       const Value b = pop(thread);
       const Value c = pop(thread);
+      charge(products_of(c, b) / kProductsForWeight);
       return put(binary(static_cast<BinaryOp>(instruction.a), c, b));
     }
     case Op::kPop:

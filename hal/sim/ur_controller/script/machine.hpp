@@ -78,6 +78,10 @@ class Machine {
     return static_cast<std::size_t>(
         std::ranges::count_if(socket_names_, [](const auto& entry) { return entry.second != 0; }));
   }
+  /// Local in the frame that runs, or ~slot of a global; may have no value.
+  [[nodiscard]] Value& variable(Thread& thread, int slot);
+  /// Work that a thread has done beside making values, in their weight.
+  void charge(std::size_t work) { made_ += work; }
   /// False when another thread moves the arm. `line` 0 lets it go.
   [[nodiscard]] bool take_arm(const Thread& thread);
   void release_arm(const Thread& thread);

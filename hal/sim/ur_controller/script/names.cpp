@@ -71,7 +71,8 @@ Names find_names(const std::vector<Token>& tokens, std::size_t program) {
   for (std::size_t i = 0; i + 1 < tokens.size(); ++i) {
     const Token& token = tokens[i];
     brackets += bracket(token);
-    if (token.kind != Kind::kName || brackets != 0) continue;
+    const bool member = i > 0 && tokens[i - 1].is(".");
+    if (token.kind != Kind::kName || brackets != 0 || member) continue;
     if (opens_function(tokens, i)) {
       if (i != program) names.functions[tokens[i + 1].text] = parameters_at(tokens, i + 2);
       blocks.push_back(true);

@@ -25,6 +25,11 @@ std::string TokenCursor::expect_name() {
   return name;
 }
 
+std::string TokenCursor::expect_member() {
+  if (is_keyword(now().text)) fail_here();
+  return expect_name();
+}
+
 void TokenCursor::end_statement() {
   if (failed() || now().kind == Kind::kEnd || now().kind == Kind::kName) return;
   if (now().kind != Kind::kLineEnd) return fail_here();

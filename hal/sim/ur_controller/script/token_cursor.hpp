@@ -34,6 +34,8 @@ class TokenCursor {
     if (!accept(symbol)) fail_here();
   }
   std::string expect_name();
+  /// Of a struct: a name that is no keyword.
+  std::string expect_member();
   /// More than one statement may stand on a line.
   void end_statement();
   void skip_line_ends() {

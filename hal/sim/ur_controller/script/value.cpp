@@ -29,7 +29,7 @@ void append(std::string& text, const Value& value) {
     text += ']';
   } else if (const auto* members = value.as<StructValue>()) {
     text += "struct(";
-    for (std::size_t k = 0; k < members->names.size(); ++k) {
+    for (std::size_t k = 0; k < members->names.size() && text.size() <= kTextBytesMax; ++k) {
       text += (k > 0 ? ", " : "") + members->names[k] + " = ";
       append(text, members->values[k]);
     }
@@ -39,23 +39,41 @@ void append(std::string& text, const Value& value) {
   }
 }
 
-std::uint32_t weight_of(const List& list) {
-  std::uint64_t sum = 1;
-  for (const Value& element : list) sum += element.weight;
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, UINT32_MAX / 2));
+/// What a text weighs beside its value's 1.
+std::uint32_t weight_of(std::string_view text) { return static_cast<std::uint32_t>(text.size() / 32); }
+
+/// Weight and depth of a value with these in it.
+void contain(Value& value, const List& elements) {
+  std::uint64_t weight = value.weight;
+  int depth = 0;
+  for (const Value& element : elements) {
+    weight += element.weight;
+    depth = std::max<int>(depth, element.depth);
+  }
+  value.weight = static_cast<std::uint32_t>(std::min<std::uint64_t>(weight, UINT32_MAX / 2));
+  value.depth = static_cast<std::uint16_t>(std::min(depth + 1, UINT16_MAX / 2));
 }
 
 }  // namespace
 
+Value::Value(std::string value) : content(std::move(value)), weight(1 + weight_of(std::get<std::string>(content))) {}
+
 Value::Value(List value) : content(std::move(value)) {
   const List& list = std::get<List>(content);
-  weight = weight_of(list);
-  capacity = static_cast<std::uint32_t>(list.size());
+  contain(*this, list);
+  capacity = static_cast<std::uint16_t>(std::min<std::size_t>(list.size(), UINT16_MAX));
 }
 
 Value::Value(StructValue value) : content(std::move(value)) {
   const auto& members = std::get<StructValue>(content);
-  weight = weight_of(members.values) + static_cast<std::uint32_t>(members.names.size());
+  for (const std::string& name : members.names) weight += 1 + weight_of(name);
+  contain(*this, members.values);
+}
+
+Value with_capacity(List list, std::size_t capacity) {
+  Value value(std::move(list));
+  value.capacity = std::max(value.capacity, static_cast<std::uint16_t>(std::min<std::size_t>(capacity, UINT16_MAX)));
+  return value;
 }
 
 double Value::number() const {
@@ -83,6 +101,11 @@ std::string_view type_name(const Value& value) {
 }
 
 bool alike(const Value& a, const Value& b) {
+  const auto* members = a.as<StructValue>();
+  const auto* others = b.as<StructValue>();
+  if (members != nullptr && others != nullptr) {
+    return members->names == others->names && std::ranges::equal(members->values, others->values, alike);
+  }
   return (a.is_number() && b.is_number()) || a.content.index() == b.content.index();
 }
 

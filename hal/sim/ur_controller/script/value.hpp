@@ -30,6 +30,8 @@ struct StructValue {
 };
 
 inline constexpr std::uint32_t kWeightMax = 20'000;  // elements of a list with all its lists
+inline constexpr std::uint16_t kDepthMax = 100;
+inline constexpr std::string_view kTooLarge = "Out of memory: a list is too large, or nested too deep";
 inline constexpr std::size_t kTextBytesMax = 64 * 1024;
 
 struct Value {
@@ -37,16 +39,14 @@ struct Value {
                StructValue>
       content;
   std::uint32_t weight = 1;    ///< of a list: 1 and what its elements weigh
-  std::uint32_t capacity = 0;  ///< of a list: how many elements it may have
+  std::uint16_t capacity = 0;  ///< of a list: how many elements it may have
+  std::uint16_t depth = 0;     ///< of lists within each other, at least
 
   Value() = default;
-  Value(bool value) : content(value) {}          // NOLINT(google-explicit-constructor)
-  Value(std::int64_t value) : content(value) {}  // NOLINT(google-explicit-constructor)
-  Value(double value) : content(value) {}        // NOLINT(google-explicit-constructor)
-  Value(std::string value)
-      : content(std::move(value)),
-        weight(1 + static_cast<std::uint32_t>(std::get<std::string>(content).size() / 32)) {
-  }  // NOLINT(google-explicit-constructor)
+  Value(bool value) : content(value) {}                             // NOLINT(google-explicit-constructor)
+  Value(std::int64_t value) : content(value) {}                     // NOLINT(google-explicit-constructor)
+  Value(double value) : content(value) {}                           // NOLINT(google-explicit-constructor)
+  Value(std::string value);                                         // NOLINT(google-explicit-constructor)
   Value(const char*) = delete;                                      // would become a bool
   Value(const PoseValue& value) : content(value), weight(6) {}      // NOLINT(google-explicit-constructor)
   Value(ThreadHandle value) : content(value) {}                     // NOLINT(google-explicit-constructor)
@@ -62,6 +62,8 @@ struct Value {
   [[nodiscard]] T* as() {
     return std::get_if<T>(&content);
   }
+  /// No program may have such a value.
+  [[nodiscard]] bool too_large() const { return weight > kWeightMax || depth > kDepthMax; }
   [[nodiscard]] bool empty() const { return std::holds_alternative<std::monostate>(content); }
   /// An integer or a float.
   [[nodiscard]] bool is_number() const { return as<std::int64_t>() != nullptr || as<double>() != nullptr; }
@@ -73,7 +75,9 @@ struct Value {
 [[nodiscard]] std::string text_of(const Value& value);
 /// "bool", "int", ... for errors.
 [[nodiscard]] std::string_view type_name(const Value& value);
-/// Of one type, or both numbers.
+/// With room for more elements, where there are less than that.
+[[nodiscard]] Value with_capacity(List list, std::size_t capacity);
+/// Of one type, or both numbers; of structs the same members.
 [[nodiscard]] bool alike(const Value& a, const Value& b);
 /// Equal in URScript: numbers by value, lists and poses element by element, other types never with each other.
 [[nodiscard]] bool equal(const Value& a, const Value& b);

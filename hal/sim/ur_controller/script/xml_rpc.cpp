@@ -9,7 +9,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "hal/sim/ur_controller/script/operations.hpp"
+#include "hal/sim/ur_controller/script/places.hpp"
 
 namespace firstlook::sim::ur::script {
 namespace {
@@ -177,6 +177,7 @@ class Reader {
     if (opens("string")) return closed(text(), "string");
     if (tag("<string/>")) return std::string();
     if (opens("array")) return array(nesting);
+    if (tag("<struct/>")) return StructValue();
     if (opens("struct")) return structure(nesting);
     if (tag("<nil/>")) return {};
     const std::string untyped = text();

@@ -1,5 +1,6 @@
 /// Values of URScript and what can be made of them.
 #include <catch2/catch.hpp>
+#include <chrono>
 
 #include "hal/sim/ur_controller/script/compiler.hpp"
 #include "tests/support/script_robot.hpp"
@@ -13,10 +14,10 @@ using Catch::Matchers::StartsWith;
 namespace {
 
 /// What the lines say; what ends them last.
-std::vector<std::string> said(ScriptRobot& robot, const std::string& lines) {
+std::vector<std::string> said(ScriptRobot& robot, const std::string& lines, double run_s = 0.1) {
   robot.texts.clear();
   robot.exceptions.clear();
-  robot.send("def prog():\n" + lines + "end\n", 0.1);
+  robot.send("def prog():\n" + lines + "end\n", run_s);
   std::vector<std::string> texts = robot.texts;
   for (const auto& exception : robot.exceptions) texts.push_back("! " + exception.text);
   return texts;
@@ -83,6 +84,12 @@ TEST_CASE("vectors, matrices and wrenches", "[ur][script]") {
   CHECK_THAT(robot.value("[10, 20] * [[1, 2], [3, 4]]"), StartsWith("!"));
   CHECK_THAT(robot.value("inv([[1, 2], [2, 4]])"), Contains("no inverse"));
   CHECK_THAT(robot.value("inv([[1, 2, 3], [2, 4, 5]])"), Contains("square"));
+  CHECK_THAT(robot.value("inv([[1, 2], [3]])"), Contains("square"));
+  CHECK_THAT(robot.value("inv([[0, 0], [3, 1]])"), Contains("no inverse"));
+  CHECK(robot.value("inv([[0.000001, 0], [0, 1000000000000.0]])[0, 0]") == "1e+06");
+  CHECK(robot.value("transpose([[True, False]])") == "[[True], [False]]");
+  CHECK(robot.value("size([[\"a\", \"b\"]])") == "[1, 2]");
+  CHECK(robot.value("[[2147483647, 1]] * [[1], [1]]") == "[[-2147483648]]");
   CHECK_THAT(robot.value("make_list(100, make_list(100, 1)) * make_list(100, make_list(100, 1))"),
              Contains("too large"));
   CHECK_THAT(robot.value("[[1, 2], [3]] * [[1], [2]]"), StartsWith("!"));
@@ -164,8 +171,11 @@ TEST_CASE("structs: members by name and by number, nested, given to functions an
   CHECK_THAT(said(robot, "  s = struct(a = 1)\n  s.b = 1\n").back(), Contains("no member b"));
   CHECK_THAT(said(robot, "  s = struct(a = 1)\n  textmsg(s.b)\n").back(), Contains("no member b"));
   CHECK_THAT(said(robot, "  s = struct(a = 1)\n  textmsg(s[1])\n").back(), Contains("out of bounds"));
-  CHECK_THAT(said(robot, "  s = [1]\n  textmsg(s.a)\n").back(), Contains("Type error"));
+  CHECK_THAT(said(robot, "  s = [1]\n  textmsg(s.a)\n").back(), Contains("list has no members"));
   CHECK_THAT(said(robot, "  s = 1\n  s.a = 2\n").back(), Contains("has no members"));
+  CHECK_THAT(said(robot, "  s = struct(i = struct(a = 1))\n  s.i = struct(b = 1)\n").back(), Contains("other members"));
+  CHECK(said(robot, "  s = struct(a = [1, 2])\n  s.a = struct(x = 3, y = 4)\n  textmsg(s)\n").back() ==
+        "struct(a = [3, 4])");
   CHECK_THAT(said(robot, "  s = struct(a = 1, a = 2)\n").back(), Contains("two members"));
   CHECK_THAT(said(robot, "  s = struct(a = 1)\n  s.a()\n").back(), Contains("method of struct"));
   for (const char* wrong :
@@ -220,6 +230,7 @@ TEST_CASE("lists grow up to their capacity and shrink", "[ur][script]") {
   CHECK_THAT(said(robot, "  a = [1]\n  a.append(2)\n").back(), Contains("capacity of 1"));
   CHECK_THAT(said(robot, "  a = make_list(1, 2, 4)\n  a.append(\"x\")\n").back(), Contains("Type error"));
   CHECK_THAT(said(robot, "  a = make_list(0, 2, 4)\n  a.pop()\n").back(), Contains("empty"));
+  CHECK_THAT(said(robot, "  a = make_list(0, 2, 4)\n  a.append(a.clear())\n").back(), Contains("without a value"));
   CHECK_THAT(said(robot, "  a = make_list(1, 2, 4)\n  a.insert(2, 0)\n").back(), Contains("out of bounds"));
   CHECK_THAT(said(robot, "  a = make_list(1, 2, 4)\n  a.insert(0)\n").back(), Contains("takes 2 arguments"));
   CHECK_THAT(said(robot, "  a = make_list(1, 2, 4)\n  a.sort()\n").back(), Contains("no method sort"));
@@ -227,6 +238,108 @@ TEST_CASE("lists grow up to their capacity and shrink", "[ur][script]") {
   CHECK_THAT(said(robot, "  a = make_list(5, 2, 4)\n").back(), Contains("capacity"));
   CHECK_THAT(said(robot, "  a = make_list(3, 2, 4)\n  textmsg(a.slice(2, 1))\n").back(), Contains("slice"));
   CHECK_THAT(said(robot, "  a = make_list(1, 2, 4)\n  a.append(a[7])\n").back(), Contains("out of bounds"));
+}
+
+TEST_CASE("what changes an element or a list does so at once, when all that it needs is there", "[ur][script]") {
+  ScriptRobot robot;
+  CHECK(said(robot, R"(
+  a = make_list(0, 0, 10)
+  def f():
+    a.append(1)
+    return 2
+  end
+  a.append(f())
+  textmsg(a)
+  a.insert(0, a.pop())
+  textmsg(a)
+  state = struct(n = 0, x = 0)
+  def next():
+    state.n = state.n + 1
+    return state.n
+  end
+  state.x = next()
+  textmsg(state)
+  b = [5, 6, 7]
+  b[0] = b.pop()
+  textmsg(b)
+)") == Texts{"[1, 2]", "[2, 1]", "struct(n = 1, x = 1)", "[7, 6]"});
+  CHECK(said(robot, R"(
+  global queue = make_list(0, 0, 1000)
+  global both = struct(a = 0, b = 0)
+  def slow(value):
+    sleep(0.01)
+    return value
+  end
+  thread one():
+    i = 0
+    while i < 5:
+      queue.append(slow(1))
+      both.a = slow(i)
+      i = i + 1
+    end
+  end
+  thread two():
+    i = 0
+    while i < 300:
+      queue.append(2)
+      both.b = i
+      i = i + 1
+    end
+  end
+  first = run one()
+  second = run two()
+  join first
+  join second
+  textmsg(queue.length())
+  textmsg(both)
+)",
+             0.5) == Texts{"305", "struct(a = 4, b = 299)"});
+}
+
+TEST_CASE("the words of the language are no members", "[ur][script]") {
+  for (const char* wrong :
+       {"s = struct(end = 1)\n", "s = struct(a = 1)\nx = s.end\n", "s = struct(a = 1)\ns.global = 6\n"}) {
+    INFO(wrong);
+    CHECK_FALSE(script::compile(wrong));
+  }
+  CHECK(script::compile("s = struct(p = 1, length = 2, append = 3,)\nx = s.append + s.p\ns.length = 3\n"));
+}
+
+TEST_CASE("values are bounded, with their names and in depth", "[ur][script]") {
+  ScriptRobot robot;
+  const std::string name(300'000, 'n');
+  CHECK_THAT(said(robot, "  s = struct(" + name + " = 1)\n  m = make_list(1000, s)\n").back(), Contains("too large"));
+  const std::string shorter(60'000, 'n');
+  const Texts printed = said(robot, "  s = struct(" + shorter + " = 1)\n  textmsg([s, s, s, s, s, s])\n");
+  REQUIRE(printed.size() == 1);
+  CHECK(printed[0].size() < 200'000);
+  CHECK_THAT(said(robot, "  a = [1]\n  while True:\n    a = [a]\n  end\n").back(), Contains("nested too deep"));
+  CHECK_THAT(said(robot, "  a = [[1], [1]]\n  while True:\n    a[0] = a\n  end\n").back(), Contains("Out of memory"));
+  CHECK_THAT(said(robot,
+                  "  a = make_list(0, 0, 20000)\n  one = make_list(1000, 0)\n  i = 0\n  while i < 19:\n"
+                  "    a.extend(one)\n    i = i + 1\n  end\n  i = 0\n  while i < 999:\n    a.append(1)\n"
+                  "    i = i + 1\n  end\n  textmsg(a.length())\n  a.append(1)\n")
+                 .back(),
+             Contains("too large"));
+  CHECK(robot.texts.back() == "19999");
+}
+
+TEST_CASE("heavy lists and matrices do not hold up the controller", "[ur][script]") {
+  const std::string big =
+      "  z = make_list(0, 0, 20000)\n  one = make_list(1000, 0)\n  i = 0\n  while i < 9:\n    z.extend(one)\n"
+      "    i = i + 1\n  end\n  m = [z]\n  r = make_list(58, 1.5)\n  k = make_list(58, r)\n  q = make_list(50, "
+      "make_list(50, 0))\n"
+      "  i = 0\n  while i < 50:\n    q[i, i] = 1\n    i = i + 1\n  end\n  while True:\n";
+  for (const char* line : {"y = transpose(m)", "y = k * k", "y = inv(q)", "z.insert(0, 1) z.remove(0)",
+                           "z.append(1) z.pop()", "y = z.length()", "z[0] = 1", "y = z.slice(0, 9000)"}) {
+    INFO(line);
+    ScriptRobot robot;
+    const auto begin = std::chrono::steady_clock::now();
+    const Texts end = said(robot, big + "    " + line + "\n  end\n", 3);
+    CHECK_THAT(end.back(), Contains("too much behind"));
+    // A thousand cycles of a program that never waits: some milliseconds each at most.
+    CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(60));
+  }
 }
 
 TEST_CASE("a list that another thread changes is the program's", "[ur][script]") {
