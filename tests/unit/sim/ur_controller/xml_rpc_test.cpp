@@ -207,9 +207,12 @@ TEST_CASE("answers of XML-RPC as values", "[ur][script]") {
     INFO(wrong);
     CHECK_FALSE(script::read_xml_rpc_answer(answer_of(wrong)));
   }
-  std::string deep = "<value>1</value>";
-  for (int i = 0; i < 1000; ++i) deep = "<value><array><data>" + deep + "</data></array></value>";
-  CHECK_FALSE(script::read_xml_rpc_answer(answer_of(deep)));
+  std::string opening, closing;
+  for (int i = 0; i < 1000; ++i) {
+    opening += "<value><array><data>";
+    closing += "</data></array></value>";
+  }
+  CHECK_FALSE(script::read_xml_rpc_answer(answer_of(opening + "<value>1</value>" + closing)));
   CHECK_FALSE(script::xml_rpc_call("f", std::vector<Value>{Value(script::ThreadHandle{1})}));
 }
 
