@@ -68,6 +68,10 @@ void Call::answer_or_fail(Computed computed) {
   answer(std::move(*computed));
 }
 
+void Call::fail_excess(Value& value) {
+  if (const auto excess = value.excess(); !excess.empty()) fail(std::string(excess));
+}
+
 void Call::fail_type(std::size_t i, std::string_view wanted) {
   fail(fmt::format("Type error: argument {} is {}, not {}", i + 1, type_name(arguments_[i]), wanted));
 }

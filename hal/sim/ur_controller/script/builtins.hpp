@@ -46,6 +46,8 @@ class Call {
   void fail(std::string text) {
     if (error_.empty()) error_ = std::move(text);
   }
+  /// Where the value is larger than a program may have.
+  void fail_excess(Value& value);
   void fail_type(std::size_t i, std::string_view wanted);
 
   [[nodiscard]] bool ok() const { return error_.empty(); }

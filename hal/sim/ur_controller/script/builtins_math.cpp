@@ -178,7 +178,8 @@ void random_number(Call& c) {
 void make_list(Call& c) {
   const int length = c.integer(0, 0, 1000), capacity = c.integer(2, 0, static_cast<int>(kWeightMax));
   if (capacity != 0 && capacity < length) c.fail("A list longer than its capacity");
-  if (c.value(1).weight * static_cast<std::size_t>(length) > kWeightMax) c.fail(std::string(kTooLarge));
+  if (c.value(1).weight * static_cast<std::size_t>(length) > kWeightMax) c.fail("Out of memory: a list is too large");
+  if (c.value(1).empty()) c.fail_type(1, "a value");
   if (!c.ok()) return;
   c.answer(with_capacity(List(static_cast<std::size_t>(length), c.value(1)), static_cast<std::size_t>(capacity)));
 }

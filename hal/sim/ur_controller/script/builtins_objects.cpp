@@ -34,18 +34,22 @@ void call_method(Call& c) {
 /// slot of a variable, length of a path, path, method, arguments. A server's method may have the name of one that
 /// changes a list.
 void call_changing_method(Call& c) {
-  Value& variable = c.variable(static_cast<int>(c.integer(0)));
+  const int slot = static_cast<int>(c.integer(0));
+  Value& variable = c.variable(slot);
   const auto length = static_cast<std::size_t>(c.integer(1));
   const auto path = c.values().subspan(2, length), arguments = c.values().subspan(3 + length);
   const std::string method = c.text(2 + length);
-  if (variable.empty()) return c.fail("A variable has no value yet");
-  const Value* object = find_element(variable, path);
-  if (object != nullptr && object->as<RpcHandle>() != nullptr) {
-    return call_remote(c, RpcHandle(*object->as<RpcHandle>()), method, arguments);
+  if (c.state().first) {  // another thread may change the variable while the server computes
+    if (variable.empty()) return c.fail(c.machine().no_value_yet(slot));
+    c.machine().charge_for(variable);
+    const Value* object = find_element(variable, path);
+    const RpcHandle* rpc = object != nullptr ? object->as<RpcHandle>() : nullptr;
+    if (rpc != nullptr) c.state().rpc_url = rpc->url;
   }
+  if (!c.state().rpc_url.empty()) return call_remote(c, RpcHandle(c.state().rpc_url), method, arguments);
   if (method == "insert" || method == "remove") c.machine().charge(variable.weight / 2);  // the others make way
   c.answer_or_fail(call_at(variable, path, method, arguments));
-  if (variable.too_large()) c.fail(std::string(kTooLarge));
+  c.fail_excess(variable);
 }
 
 /// Names that no script can call: methods are compiled to them.

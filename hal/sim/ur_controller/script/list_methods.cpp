@@ -20,6 +20,12 @@ struct Target {
 
 using Arguments = std::span<const Value>;
 
+/// Where something can be put, or a slice may end: behind the last element, too.
+std::expected<std::size_t, std::string> index_up_to_end(const Value& index, const List& list) {
+  if (index_within(index, list.size() + 1)) return index_within(index, list.size() + 1);
+  return std::unexpected(index_within(index, list.size()).error());
+}
+
 Computed insert_at(Target& target, std::size_t at, Arguments values) {
   List& list = target.list;
   if (values.size() > target.room()) {
@@ -49,7 +55,7 @@ Computed extend(Target& target, Arguments arguments) {
 }
 
 Computed insert(Target& target, Arguments arguments) {
-  const auto at = index_within(arguments[0], target.list.size() + 1);
+  const auto at = index_up_to_end(arguments[0], target.list);
   return at ? insert_at(target, *at, arguments.subspan(1)) : std::unexpected(at.error());
 }
 
@@ -57,6 +63,8 @@ Computed take(Target& target, std::size_t at) {
   Value value = std::move(target.list[at]);
   target.value.weight -= value.weight;
   target.list.erase(target.list.begin() + static_cast<std::ptrdiff_t>(at));
+  if (target.list.capacity() > 4 * target.list.size() + 16)
+    target.list.shrink_to_fit();  // what it weighs is what it takes
   return value;
 }
 Computed pop(Target& target, Arguments) {
@@ -69,15 +77,14 @@ Computed remove(Target& target, Arguments arguments) {
 }
 
 Computed clear(Target& target, Arguments) {
-  target.list.clear();
+  target.list = List();
   target.value.weight = 1;
   return Value();
 }
 
 /// From an index to before another.
 Computed slice(Target& target, Arguments arguments) {
-  const auto begin = index_within(arguments[0], target.list.size() + 1),
-             end = index_within(arguments[1], target.list.size() + 1);
+  const auto begin = index_up_to_end(arguments[0], target.list), end = index_up_to_end(arguments[1], target.list);
   if (!begin || !end) return std::unexpected(begin ? end.error() : begin.error());
   if (*begin > *end) return std::unexpected("A slice that ends before it begins");
   return Value(List(target.list.begin() + static_cast<std::ptrdiff_t>(*begin),

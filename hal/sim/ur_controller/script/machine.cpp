@@ -17,6 +17,7 @@ constexpr double kBusyMax_s = 2;  // without ever waiting: then the controller s
 constexpr std::uint64_t kMadeMax = 200'000;    // weight of values, of one thread in one cycle
 constexpr std::uint64_t kHeldMax = 500'000;    // of the whole program; some 70 bytes each
 constexpr std::size_t kProductsForWeight = 4;  // as much work as to make a value of weight 1
+constexpr std::string_view kNoValue = "Type error: something without a value is assigned";
 constexpr std::size_t kFramesMax = 200;
 constexpr std::size_t kStackMax = 10'000;
 constexpr std::size_t kThreadsMax = 64;
@@ -76,6 +77,12 @@ bool Machine::take_arm(const Thread& thread) {
   }
   return true;
 }
+
+std::string Machine::no_value_yet(int slot) const {
+  return fmt::format("{} has no value yet", slot < 0 ? code_.globals[static_cast<std::size_t>(~slot)] : "A variable");
+}
+
+void Machine::charge_for(const Value& container) { made_ += container.weight / 16; }
 
 Value& Machine::variable(Thread& thread, int slot) {
   if (slot < 0) return globals_[static_cast<std::size_t>(~slot)];
@@ -178,7 +185,7 @@ bool Machine::execute_builtin(Thread& thread, const Instruction& instruction) {
     return false;
   }
   thread.call = {};
-  if (call.answer().too_large()) return fail(instruction, std::string(kTooLarge)), false;
+  if (const auto excess = call.answer().excess(); !excess.empty()) return fail(instruction, std::string(excess)), false;
   made_ += call.answer().weight;
   Value answer = std::move(call.answer());
   thread.stack.resize(thread.stack.size() - count);
@@ -227,7 +234,7 @@ bool Machine::execute(Thread& thread) {
   const auto a = static_cast<std::size_t>(instruction.a);
   const auto put = [&](Computed result) {
     if (!result) return fail(instruction, std::move(result.error())), false;
-    if (result->too_large()) return fail(instruction, std::string(kTooLarge)), false;
+    if (const auto excess = result->excess(); !excess.empty()) return fail(instruction, std::string(excess)), false;
     made_ += result->weight;
     stack.push_back(std::move(*result));
     return true;
@@ -293,6 +300,7 @@ bool Machine::execute(Thread& thread) {
   ++frame.next;
   switch (instruction.op) {
     case Op::kConstant:
+      made_ += code_.constants[a].weight - 1;
       stack.push_back(code_.constants[a]);
       return true;
     case Op::kLoadLocal:
@@ -302,7 +310,7 @@ bool Machine::execute(Thread& thread) {
     case Op::kStoreLocal:
     case Op::kStoreGlobal: {
       Value value = pop(thread);
-      if (value.empty()) return fail(instruction, "Type error: something without a value is assigned"), false;
+      if (value.empty()) return fail(instruction, std::string(kNoValue)), false;
       Value& variable = instruction.op == Op::kStoreLocal ? stack[frame.base + a] : globals_[a];
       variable = assigned(variable, std::move(value));
       return true;
@@ -314,11 +322,13 @@ bool Machine::execute(Thread& thread) {
     }
     case Op::kSetElement: {
       Value& container = variable(thread, instruction.b);
-      if (container.empty()) return fail(instruction, "A variable has no value yet"), false;
+      if (container.empty()) return fail(instruction, no_value_yet(instruction.b)), false;
+      if (stack.back().empty()) return fail(instruction, std::string(kNoValue)), false;
       made_ += stack.back().weight;
+      charge_for(container);
       const Computed done = set_element(container, std::span<const Value>(stack).last(a + 1).first(a), stack.back());
       if (!done) return fail(instruction, done.error()), false;
-      if (container.too_large()) return fail(instruction, std::string(kTooLarge)), false;
+      if (const auto excess = container.excess(); !excess.empty()) return fail(instruction, std::string(excess)), false;
       stack.resize(stack.size() - a - 1);
       return true;
     }
@@ -340,6 +350,10 @@ bool Machine::execute(Thread& thread) {
       stack.pop_back();
       return true;
     case Op::kMakeList: {
+      for (std::size_t i = stack.size() - a; i < stack.size(); ++i) {
+        if (stack[i].empty())
+          return fail(instruction, "Type error: something without a value is put into a list"), false;
+      }
       List list(std::make_move_iterator(stack.end() - instruction.a), std::make_move_iterator(stack.end()));
       stack.resize(stack.size() - a);
       return put(Value(std::move(list)));

@@ -22,6 +22,7 @@ struct CallState {
   int phase = 0;
   double until_s = 0;
   std::uint64_t ticket = 0;
+  std::string rpc_url;  ///< of the server that is being called
 };
 
 struct Frame {
@@ -80,6 +81,9 @@ class Machine {
   }
   /// Local in the frame that runs, or ~slot of a global; may have no value.
   [[nodiscard]] Value& variable(Thread& thread, int slot);
+  [[nodiscard]] std::string no_value_yet(int slot) const;
+  /// A place in it is looked for.
+  void charge_for(const Value& container);
   /// Work that a thread has done beside making values, in their weight.
   void charge(std::size_t work) { made_ += work; }
   /// False when another thread moves the arm. `line` 0 lets it go.

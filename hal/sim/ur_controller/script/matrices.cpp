@@ -12,11 +12,18 @@ constexpr std::size_t kProductsMax = 200'000;
 constexpr Eigen::Index kInverseSizeMax = 50;
 constexpr double kSingular = 1e-13;  // of a matrix whose rows have been scaled to 1
 
-using Integers = Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic>;
+/// Sums of them wrap around, as integers of 32 bits do.
+using Integers = Eigen::Matrix<std::uint64_t, Eigen::Dynamic, Eigen::Dynamic>;
 
 bool all_numbers(const List& list) { return !list.empty() && std::ranges::all_of(list, &Value::is_number); }
 bool all_integers(const List& list) {
   return std::ranges::all_of(list, [](const Value& v) { return v.as<std::int64_t>() != nullptr; });
+}
+
+template <typename Number>
+Number number(const Value& value) {
+  if constexpr (std::is_same_v<Number, double>) return value.number();
+  return static_cast<Number>(*value.as<std::int64_t>());
 }
 
 /// A matrix, or a list as one column.
@@ -29,14 +36,14 @@ Eigen::Matrix<Number, Eigen::Dynamic, Eigen::Dynamic> eigen(const Value& value) 
     const List* row = rows[i].as<List>();
     for (std::size_t j = 0; j < std::max<std::size_t>(1, columns); ++j) {
       const Value& element = row != nullptr ? (*row)[j] : rows[i];
-      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = static_cast<Number>(element.number());
+      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = number<Number>(element);
     }
   }
   return matrix;
 }
 
 Value value_of(double number) { return number; }
-Value value_of(std::int64_t number) { return static_cast<std::int64_t>(static_cast<std::int32_t>(number)); }
+Value value_of(std::uint64_t number) { return static_cast<std::int64_t>(static_cast<std::int32_t>(number)); }
 
 template <typename Matrix>
 Value list_of_rows(const Matrix& matrix, bool one_column) {
@@ -88,7 +95,7 @@ Computed matrix_product(const Value& a, const Value& b) {
   if (products_of(a, b) > kProductsMax) return std::unexpected("Matrices too large to be multiplied");
   const bool list = columns_of(b) == 0;
   if (has_integers(a) && has_integers(b)) {
-    return list_of_rows(Integers(eigen<std::int64_t>(a) * eigen<std::int64_t>(b)), list);
+    return list_of_rows(Integers(eigen<std::uint64_t>(a) * eigen<std::uint64_t>(b)), list);
   }
   return list_of_rows(Eigen::MatrixXd(eigen<double>(a) * eigen<double>(b)), list);
 }

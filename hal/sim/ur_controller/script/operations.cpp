@@ -18,22 +18,26 @@ bool integers(const Value& a, const Value& b) {
 }
 
 /// Integers have 32 bits and wrap around.
-Value wrapped(std::int64_t value) { return static_cast<std::int64_t>(static_cast<std::int32_t>(value)); }
+Value wrapped(std::uint64_t value) { return static_cast<std::int64_t>(static_cast<std::int32_t>(value)); }
 
 Computed arithmetic(BinaryOp op, const Value& a, const Value& b) {
   const double x = a.number(), y = b.number();
   if (op == BinaryOp::kDivide || op == BinaryOp::kModulo) {
     if (y == 0) return std::unexpected("Division by zero");
     if (op == BinaryOp::kDivide) return Value(x / y);
-    if (integers(a, b)) return wrapped(*a.as<std::int64_t>() % *b.as<std::int64_t>());
+    if (integers(a, b) && y == -1) return wrapped(0);
+    if (integers(a, b)) return wrapped(static_cast<std::uint64_t>(*a.as<std::int64_t>() % *b.as<std::int64_t>()));
     return Value(std::fmod(x, y));
   }
   if (integers(a, b)) {
-    const std::int64_t i = *a.as<std::int64_t>(), j = *b.as<std::int64_t>();
+    const auto i = static_cast<std::uint64_t>(*a.as<std::int64_t>()),
+               j = static_cast<std::uint64_t>(*b.as<std::int64_t>());
     return wrapped(op == BinaryOp::kAdd ? i + j : op == BinaryOp::kSubtract ? i - j : i * j);
   }
   return Value(op == BinaryOp::kAdd ? x + y : op == BinaryOp::kSubtract ? x - y : x * y);
 }
+
+Computed combined(BinaryOp op, const Value& a, const Value& b);
 
 /// Lists of one length are added and subtracted element by element, and multiplied with numbers.
 Computed elementwise(BinaryOp op, const Value& a, const Value& b) {
@@ -45,11 +49,20 @@ Computed elementwise(BinaryOp op, const Value& a, const Value& b) {
   const std::size_t count = x != nullptr ? x->size() : y->size();
   List result;
   for (std::size_t i = 0; i < count; ++i) {
-    Computed element = binary(op, x != nullptr ? (*x)[i] : a, y != nullptr ? (*y)[i] : b);
+    Computed element = combined(op, x != nullptr ? (*x)[i] : a, y != nullptr ? (*y)[i] : b);
     if (!element) return element;
     result.push_back(std::move(*element));
   }
   return Value(std::move(result));
+}
+
+/// Numbers, or lists element by element.
+Computed combined(BinaryOp op, const Value& a, const Value& b) {
+  if (a.is_number() && b.is_number()) return arithmetic(op, a, b);
+  const bool lists = a.as<List>() != nullptr || b.as<List>() != nullptr;
+  const bool fitting = (a.as<List>() != nullptr || a.is_number()) && (b.as<List>() != nullptr || b.is_number());
+  if (lists && fitting) return elementwise(op, a, b);
+  return type_error("combine", a, b);
 }
 
 Computed ordered(BinaryOp op, const Value& a, const Value& b) {
@@ -86,16 +99,12 @@ Computed binary(BinaryOp op, const Value& a, const Value& b) {
     default:
       break;
   }
-  if (a.is_number() && b.is_number()) return arithmetic(op, a, b);
-  const bool lists = a.as<List>() != nullptr || b.as<List>() != nullptr;
-  const bool fitting = (a.as<List>() != nullptr || a.is_number()) && (b.as<List>() != nullptr || b.is_number());
   if (op == BinaryOp::kMultiply && products_of(a, b) > 0) return matrix_product(a, b);
-  if (lists && fitting) return elementwise(op, a, b);
-  return type_error("combine", a, b);
+  return combined(op, a, b);
 }
 
 Computed negate(const Value& value) {
-  if (const auto* i = value.as<std::int64_t>()) return wrapped(-*i);
+  if (const auto* i = value.as<std::int64_t>()) return wrapped(-static_cast<std::uint64_t>(*i));
   if (const auto* d = value.as<double>()) return Value(-*d);
   if (value.as<List>() != nullptr) return binary(BinaryOp::kMultiply, value, Value(std::int64_t{-1}));
   return std::unexpected(fmt::format("Type error: cannot negate {}", type_name(value)));

@@ -106,7 +106,7 @@ Computed call_at(Value& container, Path path, std::string_view method, std::span
 
 Value assigned(const Value& before, Value value) {
   const List* list = before.as<List>();
-  if (list == nullptr) return value;
+  if (list == nullptr || before.capacity == 0) return value;
   StructValue* members = value.as<StructValue>();
   if (members != nullptr && !members->values.empty()) {
     const Value& kind = list->empty() ? members->values.front() : list->front();

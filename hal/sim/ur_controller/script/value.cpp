@@ -54,6 +54,23 @@ void contain(Value& value, const List& elements) {
   value.depth = static_cast<std::uint16_t>(std::min(depth + 1, UINT16_MAX / 2));
 }
 
+/// As it is now, in all that it contains.
+void measure_depth(Value& value) {
+  List* const elements = value.as<List>() != nullptr          ? value.as<List>()
+                         : value.as<StructValue>() != nullptr ? &value.as<StructValue>()->values
+                                                              : nullptr;
+  if (elements == nullptr) return;
+  value.depth = 1;
+  for (Value& element : *elements) {
+    measure_depth(element);
+    value.depth = std::max<std::uint16_t>(value.depth, static_cast<std::uint16_t>(element.depth + 1));
+  }
+}
+
+bool int_or_thread(const Value& value) {
+  return value.as<std::int64_t>() != nullptr || value.as<ThreadHandle>() != nullptr;
+}
+
 }  // namespace
 
 Value::Value(std::string value) : content(std::move(value)), weight(1 + weight_of(std::get<std::string>(content))) {}
@@ -74,6 +91,12 @@ Value with_capacity(List list, std::size_t capacity) {
   Value value(std::move(list));
   value.capacity = std::max(value.capacity, static_cast<std::uint16_t>(std::min<std::size_t>(capacity, UINT16_MAX)));
   return value;
+}
+
+std::string_view Value::excess() {
+  if (weight > kWeightMax) return "Out of memory: a list is too large";
+  if (depth > kDepthMax) measure_depth(*this);  // what made it deep may be gone
+  return depth > kDepthMax ? "Out of memory: lists are nested too deep" : "";
 }
 
 double Value::number() const {
@@ -106,7 +129,8 @@ bool alike(const Value& a, const Value& b) {
   if (members != nullptr && others != nullptr) {
     return members->names == others->names && std::ranges::equal(members->values, others->values, alike);
   }
-  return (a.is_number() && b.is_number()) || a.content.index() == b.content.index();
+  return (a.is_number() && b.is_number()) || (int_or_thread(a) && int_or_thread(b)) ||
+         a.content.index() == b.content.index();
 }
 
 bool equal(const Value& a, const Value& b) {

@@ -31,7 +31,6 @@ struct StructValue {
 
 inline constexpr std::uint32_t kWeightMax = 20'000;  // elements of a list with all its lists
 inline constexpr std::uint16_t kDepthMax = 100;
-inline constexpr std::string_view kTooLarge = "Out of memory: a list is too large, or nested too deep";
 inline constexpr std::size_t kTextBytesMax = 64 * 1024;
 
 struct Value {
@@ -62,8 +61,8 @@ struct Value {
   [[nodiscard]] T* as() {
     return std::get_if<T>(&content);
   }
-  /// No program may have such a value.
-  [[nodiscard]] bool too_large() const { return weight > kWeightMax || depth > kDepthMax; }
+  /// Why no program may have such a value; empty where it may.
+  [[nodiscard]] std::string_view excess();
   [[nodiscard]] bool empty() const { return std::holds_alternative<std::monostate>(content); }
   /// An integer or a float.
   [[nodiscard]] bool is_number() const { return as<std::int64_t>() != nullptr || as<double>() != nullptr; }
@@ -77,7 +76,7 @@ struct Value {
 [[nodiscard]] std::string_view type_name(const Value& value);
 /// With room for more elements, where there are less than that.
 [[nodiscard]] Value with_capacity(List list, std::size_t capacity);
-/// Of one type, or both numbers; of structs the same members.
+/// Of one type, or both numbers; of structs the same members. An int may stand for a thread that is none.
 [[nodiscard]] bool alike(const Value& a, const Value& b);
 /// Equal in URScript: numbers by value, lists and poses element by element, other types never with each other.
 [[nodiscard]] bool equal(const Value& a, const Value& b);

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "hal/sim/ur_controller/script/compiler.hpp"
+#include "hal/sim/ur_controller/script/list_methods.hpp"
 #include "tests/support/script_robot.hpp"
 
 namespace firstlook {
@@ -10,6 +11,7 @@ using namespace sim::ur;
 using namespace test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
+using script::Value;
 
 namespace {
 
@@ -20,6 +22,7 @@ std::vector<std::string> said(ScriptRobot& robot, const std::string& lines, doub
   robot.send("def prog():\n" + lines + "end\n", run_s);
   std::vector<std::string> texts = robot.texts;
   for (const auto& exception : robot.exceptions) texts.push_back("! " + exception.text);
+  if (texts.empty()) texts.emplace_back("nothing");
   return texts;
 }
 using Texts = std::vector<std::string>;
@@ -81,7 +84,7 @@ TEST_CASE("vectors, matrices and wrenches", "[ur][script]") {
   const std::string a = "[[1, 0], [1, 1], [1, 2]]", at = "transpose(" + a + ")";
   CHECK(robot.value("norm(inv(" + at + " * " + a + ") * " + at + " * [1, 3, 5] - [1, 2]) < 1e-9") == "True");
   CHECK_THAT(robot.value("[[1, 2], [3, 4]] * [[1, 2]]"), Contains("do not fit"));
-  CHECK_THAT(robot.value("[10, 20] * [[1, 2], [3, 4]]"), StartsWith("!"));
+  CHECK_THAT(robot.value("[10, 20] * [[1, 2], [3, 4]]"), Contains("a product is of two matrices"));
   CHECK_THAT(robot.value("inv([[1, 2], [2, 4]])"), Contains("no inverse"));
   CHECK_THAT(robot.value("inv([[1, 2, 3], [2, 4, 5]])"), Contains("square"));
   CHECK_THAT(robot.value("inv([[1, 2], [3]])"), Contains("square"));
@@ -90,9 +93,10 @@ TEST_CASE("vectors, matrices and wrenches", "[ur][script]") {
   CHECK(robot.value("transpose([[True, False]])") == "[[True], [False]]");
   CHECK(robot.value("size([[\"a\", \"b\"]])") == "[1, 2]");
   CHECK(robot.value("[[2147483647, 1]] * [[1], [1]]") == "[[-2147483648]]");
+  CHECK(robot.value("[[2147483647, 2147483647, 2147483647]] * [2147483647, 2147483647, 2147483647]") == "[3]");
   CHECK_THAT(robot.value("make_list(100, make_list(100, 1)) * make_list(100, make_list(100, 1))"),
              Contains("too large"));
-  CHECK_THAT(robot.value("[[1, 2], [3]] * [[1], [2]]"), StartsWith("!"));
+  CHECK_THAT(robot.value("[[1, 2], [3]] * [[1], [2]]"), Contains("a product is of two matrices"));
   CHECK_THAT(robot.value("transpose([1, 2])"), Contains("a matrix"));
   CHECK(robot.value("inv(p[1, 2, 3, 0, 0, 0])") == robot.value("pose_inv(p[1, 2, 3, 0, 0, 0])"));
   // 10 N along y, seen from 0.5 m further along x: a torque about z.
@@ -126,7 +130,8 @@ TEST_CASE("elements of lists in lists", "[ur][script]") {
   textmsg(p[0])
   textmsg(m[3, 0])
 )") == Texts{"[[23, 2], [3, 4], [5, 20]]", "9", "[7, 8]", "! Index out of bounds: 3 of 3"});
-  CHECK(said(robot, "  x = p[1,2,3,0,0,0]\n  x[2] = 9\n  textmsg(x)\n  x[0, 0] = 1\n").size() == 2);
+  CHECK(said(robot, "  x = p[1,2,3,0,0,0]\n  x[2] = 9\n  textmsg(x)\n  x[0, 0] = 1\n") ==
+        Texts{"p[1, 2, 9, 0, 0, 0]", "! Type error: float has no elements"});
   CHECK_FALSE(script::compile("x = [1]\ny = x[]\n"));
   CHECK_FALSE(script::compile("x = [1]\nx[] = 2\n"));
 }
@@ -176,6 +181,15 @@ TEST_CASE("structs: members by name and by number, nested, given to functions an
   CHECK_THAT(said(robot, "  s = struct(i = struct(a = 1))\n  s.i = struct(b = 1)\n").back(), Contains("other members"));
   CHECK(said(robot, "  s = struct(a = [1, 2])\n  s.a = struct(x = 3, y = 4)\n  textmsg(s)\n").back() ==
         "struct(a = [3, 4])");
+  CHECK(said(robot,
+             "  thread th():\n    sync()\n  end\n  s = struct(t = 0)\n  s.t = run th()\n  join s.t\n  s.t = 0\n  "
+             "textmsg(s)\n")
+            .back() == "struct(t = 0)");
+  CHECK(said(robot, "  x = []\n  x = struct(a = 1)\n  textmsg(x.a)\n").back() == "1");
+  CHECK_THAT(said(robot, "  x = [1]\n  x[0] = textmsg(\"hi\")\n").back(), Contains("without a value"));
+  CHECK_THAT(said(robot, "  x = [textmsg(\"hi\")]\n").back(), Contains("without a value"));
+  CHECK_THAT(said(robot, "  global x\n  x[0] = 1\n").back(), Contains("x has no value yet"));
+  CHECK_THAT(said(robot, "  global x\n  x.append(1)\n").back(), Contains("x has no value yet"));
   CHECK_THAT(said(robot, "  s = struct(a = 1, a = 2)\n").back(), Contains("two members"));
   CHECK_THAT(said(robot, "  s = struct(a = 1)\n  s.a()\n").back(), Contains("method of struct"));
   for (const char* wrong :
@@ -310,11 +324,29 @@ TEST_CASE("values are bounded, with their names and in depth", "[ur][script]") {
   const std::string name(300'000, 'n');
   CHECK_THAT(said(robot, "  s = struct(" + name + " = 1)\n  m = make_list(1000, s)\n").back(), Contains("too large"));
   const std::string shorter(60'000, 'n');
+  // What is emptied takes no memory, and what was deep is not so for ever.
+  Value list = script::with_capacity(script::List(5000, Value(std::int64_t{1})), 10'000);
+  REQUIRE(script::call_list_method(list, "clear", {}));
+  CHECK(list.as<script::List>()->capacity() == 0);
+  list = Value(script::List(5000, Value(std::int64_t{1})));
+  while (list.as<script::List>()->size() > 1) REQUIRE(script::call_list_method(list, "pop", {}));
+  CHECK(list.as<script::List>()->capacity() < 100);
+  CHECK(list.weight == 2);
+  CHECK(said(robot,
+             "  a = make_list(1, 0, 5)\n  i = 0\n  while i < 200:\n    a[0] = a\n    a[0] = 1\n    i = i + 1\n  end\n  "
+             "textmsg(a)\n")
+            .back() == "[1]");
+  // The weight of what lies within counts.
+  CHECK_THAT(said(robot,
+                  "  s = struct(l = make_list(0, 0, 20000))\n  one = make_list(1000, 0)\n  while True:\n"
+                  "    s.l.extend(one)\n  end\n")
+                 .back(),
+             Contains("a list is too large"));
   const Texts printed = said(robot, "  s = struct(" + shorter + " = 1)\n  textmsg([s, s, s, s, s, s])\n");
   REQUIRE(printed.size() == 1);
   CHECK(printed[0].size() < 200'000);
   CHECK_THAT(said(robot, "  a = [1]\n  while True:\n    a = [a]\n  end\n").back(), Contains("nested too deep"));
-  CHECK_THAT(said(robot, "  a = [[1], [1]]\n  while True:\n    a[0] = a\n  end\n").back(), Contains("Out of memory"));
+  CHECK_THAT(said(robot, "  a = [[1], [1]]\n  while True:\n    a[0] = a\n  end\n").back(), Contains("nested too deep"));
   CHECK_THAT(said(robot,
                   "  a = make_list(0, 0, 20000)\n  one = make_list(1000, 0)\n  i = 0\n  while i < 19:\n"
                   "    a.extend(one)\n    i = i + 1\n  end\n  i = 0\n  while i < 999:\n    a.append(1)\n"
@@ -337,8 +369,8 @@ TEST_CASE("heavy lists and matrices do not hold up the controller", "[ur][script
     const auto begin = std::chrono::steady_clock::now();
     const Texts end = said(robot, big + "    " + line + "\n  end\n", 3);
     CHECK_THAT(end.back(), Contains("too much behind"));
-    // A thousand cycles of a program that never waits: some milliseconds each at most.
-    CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(60));
+    // A thousand cycles of a program that never waits; sanitizers and a busy computer make them some ten times as long.
+    CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(30));
   }
 }
 

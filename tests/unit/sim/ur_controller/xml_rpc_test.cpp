@@ -173,6 +173,19 @@ TEST_CASE("structs of a server, and methods of it that lists have, too", "[ur][s
   CHECK(robot.exceptions.empty());
 }
 
+TEST_CASE("a call goes to the server that was there when it began", "[ur][script]") {
+  RpcRobot robot;
+  robot.send(
+      "def prog():\n  global rpc = rpc_factory(\"xmlrpc\", \"http://10.0.0.9/\")\n  thread t():\n    sleep(0.05)\n"
+      "    rpc = make_list(0, 0, 5)\n  end\n  handle = run t()\n  textmsg(rpc.append(1))\n  textmsg(rpc)\nend\n",
+      0.2);
+  robot.server.to_robot = http(answer_of("<value><int>6</int></value>"));
+  robot.listen(0.1);
+  CHECK(robot.exceptions.empty());
+  CHECK(robot.texts == std::vector<std::string>{"6", "[]"});
+  CHECK_FALSE(robot.server.open_now);
+}
+
 TEST_CASE("a program that is stopped within a call hangs up", "[ur][script]") {
   RpcRobot robot;
   robot.send("def prog():\n  rpc = rpc_factory(\"xmlrpc\", \"http://10.0.0.9/\")\n  rpc.f()\nend\n", 0.1);
