@@ -95,11 +95,11 @@ await() {
 # The console since the last boot.
 console_text() { tail -n +"$boot_line" "$console"; }
 
-# Waits until the console says a word since the last boot; false after so many seconds.
+# console_says SECONDS WORD [EVERY]: waits until the console says a word since the last boot; false after so many seconds.
 console_says() {
   local end=$((SECONDS + $1))
   until console_text | grep -aq "$2"; do
     if [ $SECONDS -ge $end ] || ! is_on; then return 1; fi
-    sleep 0.2
+    sleep "${3:-0.2}"
   done
 }

@@ -21,13 +21,23 @@ calibration_expected() {
     END { print expected }'
 }
 
-# Every third cut falls into the writing of the checkpoint: on an empty disk, up to 0.4 s after the job has said that it
-# validates the calibration. The others fall anywhere: so many lines after Ready, and up to a second more.
+# The checkpoint is written just before the job says that its calibration is accepted. Every second cut aims at that, on
+# an empty disk: the first of them waits for it and takes the time since the validation began, the others cut after 0.7
+# to 1.1 of that. The others fall anywhere: so many lines after Ready, and up to a second more.
 await_moment() {
-  if [ $(($2 % 3)) = 0 ]; then
-    console_says 900 'validating the calibration' || fail "cut $2: the job does not come to its calibration; see $console"
-    sleep "0.$(printf '%03d' "$(draw "$1" "$2+" 400)")"
-    moment="writing the checkpoint ($(console_text | grep -ac "calibration accepted" || true) accepted)"
+  local began share
+  if [ $(($2 % 2)) = 0 ]; then
+    console_says 900 'validating the calibration' 0.03 || fail "cut $2: the job does not come to its calibration; see $console"
+    began=$EPOCHREALTIME
+    if [ -z "$validation_s" ]; then
+      console_says 900 'calibration accepted' 0.03 || fail "cut $2: the job does not accept its calibration; see $console"
+      validation_s=$(awk -v a="$began" -v b="$EPOCHREALTIME" 'BEGIN { print b - a }')
+      moment="behind the checkpoint, $validation_s s after the validation began"
+      return
+    fi
+    share=$((70 + $(draw "$1" "$2+" 41)))
+    sleep "$(awk -v t="$validation_s" -v share="$share" 'BEGIN { print t * share / 100 }')"
+    moment="about the checkpoint, $share % of that ($(console_text | grep -ac "calibration accepted" || true) accepted)"
     return
   fi
   local lines=$((1 + $(draw "$1" "$2" 45)))
@@ -37,12 +47,12 @@ await_moment() {
 }
 
 cut_power() {
-  local cuts=$1 seed=$2 i expected=no found lost=0 halves=0 offered=0 accepted=0 moment
+  local cuts=$1 seed=$2 i expected=no found lost=0 halves=0 offered=0 accepted=0 moment validation_s=""
   image std power
   say "$cuts power cuts, moments drawn from seed $seed"
   for ((i = 1; i <= cuts; ++i)); do
     append="init=/usr/lib/rig/tiny-init"
-    if [ $((i % 3)) = 0 ]; then append+=" rig_empties"; fi
+    if [ $((i % 2)) = 0 ]; then append+=" rig_empties"; fi
     power_on
     console_says 900 '^FOUND code' || fail "cut $i: the computer did not come back; see $console"
     found=$(console_text | tr -d '\r' | sed -n '/^FOUND begin/,/^FOUND code/p')
