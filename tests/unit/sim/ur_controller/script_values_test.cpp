@@ -369,8 +369,8 @@ TEST_CASE("heavy lists and matrices do not hold up the controller", "[ur][script
     const auto begin = std::chrono::steady_clock::now();
     const Texts end = said(robot, big + "    " + line + "\n  end\n", 3);
     CHECK_THAT(end.back(), Contains("too much behind"));
-    // A thousand cycles of a program that never waits; sanitizers and a busy computer make them some ten times as long.
-    CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(30));
+    // A thousand cycles of a program that never waits: a second or so, under sanitizers 30.
+    CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(120));
   }
 }
 
