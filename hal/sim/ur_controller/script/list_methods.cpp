@@ -22,8 +22,8 @@ using Arguments = std::span<const Value>;
 
 /// Where something can be put, or a slice may end: behind the last element, too.
 std::expected<std::size_t, std::string> index_up_to_end(const Value& index, const List& list) {
-  if (index_within(index, list.size() + 1)) return index_within(index, list.size() + 1);
-  return std::unexpected(index_within(index, list.size()).error());
+  const auto at = index_within(index, list.size() + 1);
+  return at ? at : index_within(index, list.size());  // whose error tells the list's size
 }
 
 Computed insert_at(Target& target, std::size_t at, Arguments values) {
